@@ -1,0 +1,124 @@
+//! Choosing lights, and learning which of them matter.
+//!
+//! Every sampler answers two questions alike: which light for this point ([`LightSampler::sample`]), and how probable
+//! was that light ([`LightSampler::pmf`]). They agree to the bit, because both read the same integer masses or walk the
+//! same tree. Every light that can contribute has a probability above zero. Learning happens between frames only
+//! ([`LightSampler::end_frame`]), from the logs of the frame that has ended: a frame never depends on itself, so each is unbiased.
+//!
+//! Absent from this crate: GPU handles, windows, files, ray tracing. Deterministic for a seed at any thread count:
+//! logs are merged in the order of the image's tiles.
+
+pub mod settings;
+
+use glam::Vec3;
+use scene::Scene;
+use std::fmt::Debug;
+
+pub use settings::{SamplerKind, Settings};
+
+/// What a sampler may know about the point that wants light.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadingPoint {
+    /// World position.
+    pub position_ws: Vec3,
+    /// Unit shading normal on the viewer's side: lights below it contribute nothing.
+    pub normal_ws: Vec3,
+    /// First hit of the eye path, or a later one (separate tables).
+    pub primary: bool,
+}
+
+/// A drawn light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Choice {
+    /// Index into [`Scene::lights`].
+    pub light: u32,
+    /// The probability with which it was drawn, exactly as [`LightSampler::pmf`] reports it. Above 0.
+    pub pmf: f32,
+}
+
+/// What an eye-path vertex found out about a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation {
+    /// Where.
+    pub point: ShadingPoint,
+    /// Which light.
+    pub light: u32,
+    /// Luminance of the contribution to the pixel that the light would make if nothing stood in the way, the light
+    /// being chosen for certain: path throughput x BSDF x cosine x radiance / pdf of the point on the light. Finite,
+    /// at least 0.
+    pub unshadowed: f32,
+    /// The probability with which the light was chosen.
+    pub pmf: f32,
+    /// Whether the shadow ray arrived.
+    pub visible: bool,
+}
+
+/// Counters and shares a sampler can tell about itself, for `--stats` and `info`.
+#[derive(Clone, Debug, Default, serde::Serialize)]
+pub struct SamplerStats {
+    /// Bytes held, learned tables included.
+    pub bytes: usize,
+    /// Cells in use; 0 for samplers without cells.
+    pub cells: usize,
+    /// Smallest probability that any light has at any point where it can contribute; 0 if no such guarantee is given.
+    pub min_probability: f64,
+    /// Seconds of building before the first frame.
+    pub build_s: f64,
+    /// Seconds spent in [`LightSampler::end_frame`] so far.
+    pub learn_s: f64,
+    /// What the sampler left out because it was not needed ("one light: no table").
+    pub skipped: Vec<String>,
+    /// Set if an opt-in setting makes the result biased; says which.
+    pub biased: Option<String>,
+}
+
+/// What has been learned about one light: a row of `dump`.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+pub struct LightRecord {
+    /// Largest contribution (visible, luminance) of the light at any pixel, as now remembered.
+    pub max_contribution: f64,
+    /// Mean over all observations of the visible contribution / pmf: the light's share of the image's mean luminance.
+    pub mean_contribution: f64,
+    /// Visible share of its unshadowed contribution; `NaN` if never observed (written as empty).
+    pub visible_fraction: f64,
+    /// Times it was drawn.
+    pub samples: u64,
+    /// Probability with which it is drawn now, averaged over the points where lights were drawn in the last frame (position-independent
+    /// samplers: everywhere). Sums to 1 over all lights.
+    pub probability: f64,
+    /// The least probability it is guaranteed at any point where it can contribute.
+    pub min_probability: f64,
+}
+
+/// Chooses lights.
+///
+/// The associated type [`LightSampler::Local`] holds what is worked out once per shading point and used by every
+/// draw and query there.
+pub trait LightSampler: Debug + Send + Sync {
+    /// Per-point state.
+    type Local<'a>
+    where
+        Self: 'a;
+
+    /// Whether the sampler wants observations at all; if not, the integrator collects none.
+    const LEARNS: bool;
+
+    /// Prepares for `point`.
+    fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_>;
+
+    /// Draws a light with the random number `u` (all 32 bits count; stratified `u` give stratified lights). `None`: no
+    /// light can contribute at this point.
+    fn sample(&self, local: &Self::Local<'_>, u: u32) -> Option<Choice>;
+
+    /// The probability with which [`LightSampler::sample`] draws `light` here; 0 if never.
+    fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
+
+    /// Learns from a frame. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
+    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
+
+    /// What it can tell about itself.
+    fn stats(&self) -> SamplerStats;
+
+    /// What it knows about each light, in the order of [`Scene::lights`].
+    fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+}

@@ -1,0 +1,68 @@
+//! Every knob of light choice, once.
+
+use serde::{Deserialize, Serialize};
+
+/// The ways to choose a light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SamplerKind {
+    /// Every light alike.
+    Uniform,
+    /// In proportion to emitted power.
+    Power,
+    /// Fixed subdivision of space, contribution estimated per cell.
+    Octree,
+    /// Light tree with bounding cones (Conty Estevez and Kulla 2018), visibility unknown.
+    Tree,
+    /// The same tree, leaf flux times learned visibility.
+    TreeVisible,
+    /// The global running-maximum importance table (Wald et al. 2003).
+    Table,
+}
+
+impl SamplerKind {
+    /// All of them, in the order in which tables list them.
+    pub const ALL: [Self; 6] = [
+        Self::Uniform,
+        Self::Power,
+        Self::Octree,
+        Self::Tree,
+        Self::TreeVisible,
+        Self::Table,
+    ];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Uniform => "uniform",
+            Self::Power => "power",
+            Self::Octree => "octree",
+            Self::Tree => "tree",
+            Self::TreeVisible => "tree-visible",
+            Self::Table => "table",
+        }
+    }
+}
+
+/// Knobs of light choice.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settings {
+    /// Total probability mass shared equally by all lights whatever was learned, in \[0, 1\]. Higher values find
+    /// overlooked lights sooner and bound the noise they make; lower values waste fewer samples. 0.005.
+    pub min_probability_mass: f32,
+    /// Factor by which the table's running maximum shrinks every frame, in (0, 1\]. Higher values remember longer;
+    /// lower values follow changes sooner. 0.9.
+    pub table_decay: f32,
+    /// Biased, off at 0: lights whose table entry is below this share of the mean are ignored. Higher values drop more.
+    pub ignore_below: f32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            min_probability_mass: 0.005,
+            table_decay: 0.9,
+            ignore_below: 0.0,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! From a scene to an image: the integrators, the film, image files and error metrics.
+//!
+//! [`renderer`] gives an object that renders one frame (one sample per pixel) at a time into its [`Film`]; the caller
+//! decides when to stop. `exact` is a sibling of the samplers: it sums over all lights and uses no cache, and
+//! everything is judged by it.
+//!
+//! Absent from this crate: windows, the command line. Deterministic for a seed at any thread count.
+
+pub mod error;
+pub mod film;
+pub mod frame;
+pub mod image;
+pub mod metric;
+pub mod settings;
+
+pub use error::RenderError;
+pub use film::{Film, Image};
+pub use frame::{FrameLoop, RenderStats, renderer};
+pub use metric::ImageError;
+pub use settings::{Method, PixelFilter, Settings};
