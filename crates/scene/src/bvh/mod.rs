@@ -1,6 +1,27 @@
 //! Ray queries: the nearest hit, and whether anything stands between two points.
+//!
+//! A binary tree ([`bvh2`], built by the `obvhs` crate) is collapsed into nodes of eight quantised boxes ([`node`]) and
+//! leaves of up to eight triangles ([`pack`]), so that a vector instruction tests all of one ([`kernel`]). Each mesh has
+//! one tree in its own space. Mesh 0 lies in world space and is walked first; instances of other meshes, if there are
+//! any, are found through one more tree over their boxes.
 
+mod alpha;
+mod bounds;
+mod bvh2;
+mod collapse;
+mod kernel;
+mod node;
+mod pack;
+mod query;
+mod traverse;
+
+use crate::{Mesh, SceneParts};
+use bounds::Bounds;
 use glam::Vec3;
+use kernel::portable::Portable;
+use node::Node;
+use pack::Pack;
+use query::Query;
 
 /// A ray. `direction` is of unit length; hits count in (0, `t_max`).
 #[derive(Clone, Copy, Debug)]
@@ -45,29 +66,121 @@ pub struct Hit {
 
 /// The acceleration structure over all instances of a scene.
 #[derive(Debug, Default)]
-pub struct Bvh {}
+pub struct Bvh {
+    /// Nodes of all trees; the first one is empty.
+    nodes: Vec<Node>,
+    /// Triangles of all meshes; the first one is empty.
+    packs: Vec<Pack>,
+    /// Root of the tree of instance 0, if it places its mesh by the identity.
+    fixed: Option<u32>,
+    /// Root of the tree over `placed`.
+    top: Option<u32>,
+    /// All other instances.
+    placed: Vec<Placed>,
+}
+
+/// An instance that is found through the top level.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    instance: u32,
+    /// Root of its mesh's tree.
+    root: u32,
+}
 
 impl Bvh {
-    /// Builds it for the geometry of `parts` (already validated). `build_s` and sizes go into the scene's statistics.
-    pub fn build(parts: &crate::SceneParts) -> Self {
-        let _ = parts;
-        unimplemented!("owner: bvh")
+    /// Builds it for the geometry of `parts` (already validated). Triangles without area are left out.
+    pub fn build(parts: &SceneParts) -> Self {
+        let mut bvh = Self {
+            nodes: vec![Node::new(&[], node::LEAF)],
+            packs: vec![Pack::EMPTY],
+            ..Self::default()
+        };
+        let trees: Vec<_> = parts.meshes.iter().map(|mesh| bvh.add_mesh(parts, mesh)).collect();
+        let mut boxes = Vec::new();
+        for (index, instance) in parts.instances.iter().enumerate() {
+            let Some((root, bounds)) = trees[instance.mesh as usize] else {
+                continue;
+            };
+            if index == 0 && instance.identity {
+                bvh.fixed = Some(root);
+            } else {
+                bvh.placed.push(Placed {
+                    instance: index as u32,
+                    root,
+                });
+                boxes.push(bounds.transformed(&instance.world_from_local));
+            }
+        }
+        if !boxes.is_empty() {
+            bvh.placed.push(Placed { instance: 0, root: 0 });
+            let tree = bvh2::build(&boxes);
+            let empty = boxes.len() as u32;
+            bvh.top = collapse::collapse(&tree, 1, empty, &mut bvh.nodes, |instances| instances[0]);
+        }
+        bvh.nodes.shrink_to_fit();
+        bvh.packs.shrink_to_fit();
+        bvh
+    }
+
+    /// Adds the tree of a mesh; returns its root and its box, or `None` if there is nothing to hit.
+    fn add_mesh(&mut self, parts: &SceneParts, mesh: &Mesh) -> Option<(u32, Bounds)> {
+        let has_area = |triangle: &u32| {
+            let [a, b, c] = mesh.corners(*triangle as usize).map(Vec3::as_dvec3);
+            (b - a).cross(c - a).length_squared() > 0.0
+        };
+        let triangles: Vec<u32> = (0..mesh.len() as u32).filter(has_area).collect();
+        if triangles.is_empty() {
+            return None;
+        }
+        let boxes: Vec<Bounds> = triangles
+            .iter()
+            .map(|&triangle| Bounds::of_triangle(mesh.corners(triangle as usize)))
+            .collect();
+        let tree = bvh2::build(&boxes);
+        let packs = &mut self.packs;
+        let root = collapse::collapse(&tree, node::WIDTH as u32, 0, &mut self.nodes, |boxes| {
+            let triangles = boxes.iter().map(|&index| triangles[index as usize]);
+            packs.push(Pack::new(mesh, &parts.materials, triangles));
+            packs.len() as u32 - 1
+        })?;
+        Some((root, boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b))))
     }
 
     /// The nearest hit, or `None`. `from` is skipped (the triangle the ray starts on).
-    pub fn nearest(&self, parts: &crate::SceneParts, ray: &Ray, from: PrimitiveId) -> Option<Hit> {
-        let _ = (parts, ray, from);
-        unimplemented!("owner: bvh")
+    pub fn nearest(&self, parts: &SceneParts, ray: &Ray, from: PrimitiveId) -> Option<Hit> {
+        let query = Query {
+            bvh: self,
+            parts,
+            ray,
+            skip: [from, from],
+        };
+        #[allow(unsafe_code, reason = "kernels are unsafe functions")]
+        // SAFETY: any processor has what the portable kernel needs.
+        unsafe {
+            query.nearest::<Portable>()
+        }
     }
 
     /// Whether anything but `from` and `to` is hit.
-    pub fn occluded(&self, parts: &crate::SceneParts, ray: &Ray, from: PrimitiveId, to: PrimitiveId) -> bool {
-        let _ = (parts, ray, from, to);
-        unimplemented!("owner: bvh")
+    pub fn occluded(&self, parts: &SceneParts, ray: &Ray, from: PrimitiveId, to: PrimitiveId) -> bool {
+        let query = Query {
+            bvh: self,
+            parts,
+            ray,
+            skip: [from, to],
+        };
+        #[allow(unsafe_code, reason = "kernels are unsafe functions")]
+        // SAFETY: any processor has what the portable kernel needs.
+        unsafe {
+            query.occluded::<Portable>()
+        }
     }
 
     /// Bytes held.
     pub fn bytes(&self) -> usize {
-        unimplemented!("owner: bvh")
+        size_of_val(&*self.nodes) + size_of_val(&*self.packs) + size_of_val(&*self.placed)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,244 @@
+//! Every kernel against brute force in double precision.
+
+use super::*;
+use crate::{Instance, Material};
+use glam::{Affine3A, DVec3, Mat3A, Quat};
+
+/// A small generator for test geometry (SplitMix64).
+struct Numbers(u64);
+
+impl Numbers {
+    fn unit(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0
+    }
+
+    fn direction(&mut self) -> Vec3 {
+        loop {
+            let p = self.point();
+            if (0.01..1.0).contains(&p.length_squared()) {
+                return p.normalize();
+            }
+        }
+    }
+}
+
+fn mesh_of(triangles: &[[Vec3; 3]]) -> Mesh {
+    Mesh {
+        positions: triangles.iter().flatten().copied().collect(),
+        indices: (0..triangles.len() as u32)
+            .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+            .collect(),
+        materials: vec![0; triangles.len()],
+        ..Mesh::default()
+    }
+}
+
+fn place(mesh: u32, world_from_local: Affine3A) -> Instance {
+    Instance {
+        mesh,
+        origin: 0,
+        world_from_local,
+        local_from_world: world_from_local.inverse(),
+        world_normal_from_local: Mat3A::IDENTITY,
+        identity: world_from_local == Affine3A::IDENTITY,
+    }
+}
+
+fn static_scene(triangles: &[[Vec3; 3]]) -> SceneParts {
+    SceneParts {
+        meshes: vec![mesh_of(triangles)],
+        instances: vec![place(0, Affine3A::IDENTITY)],
+        materials: vec![Material::lambert("", Vec3::ONE)],
+        ..SceneParts::default()
+    }
+}
+
+fn soup(numbers: &mut Numbers, count: usize, size: f32) -> Vec<[Vec3; 3]> {
+    (0..count)
+        .map(|_| {
+            let center = numbers.point();
+            [(); 3].map(|()| center + numbers.point() * size)
+        })
+        .collect()
+}
+
+/// All hits in (0, infinity) as (t, margin to the edges, id), margin relative to the triangle.
+fn all_hits(parts: &SceneParts, ray: &Ray) -> Vec<(f64, f64, PrimitiveId)> {
+    let (origin, direction) = (ray.origin_ws.as_dvec3(), ray.direction_ws.as_dvec3());
+    let mut hits = Vec::new();
+    for (instance, placement) in parts.instances.iter().enumerate() {
+        let mesh = &parts.meshes[placement.mesh as usize];
+        let world = |p: Vec3| -> DVec3 { placement.world_from_local.transform_point3(p).as_dvec3() };
+        let mirrored = placement.world_from_local.matrix3.determinant() < 0.0;
+        for triangle in 0..mesh.len() {
+            let [a, b, c] = mesh.corners(triangle).map(world);
+            let (e1, e2) = (b - a, c - a);
+            let p = direction.cross(e2);
+            let det = e1.dot(p);
+            let front = (det > 0.0) != mirrored;
+            let double_sided = parts.materials[mesh.materials[triangle] as usize].double_sided;
+            if det == 0.0 || !front && !double_sided {
+                continue;
+            }
+            let s = origin - a;
+            let q = s.cross(e1);
+            let (u, v, t) = (s.dot(p) / det, direction.dot(q) / det, e2.dot(q) / det);
+            let margin = u.min(v).min(1.0 - u - v);
+            if margin > -1e-3 && t > 0.0 {
+                let id = PrimitiveId {
+                    instance: instance as u32,
+                    triangle: triangle as u32,
+                };
+                hits.push((t, margin, id));
+            }
+        }
+    }
+    hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+    hits
+}
+
+/// Whether each query's answer is one that brute force allows: a hit that is clear of edges must be found.
+fn check(parts: &SceneParts, bvh: &Bvh, ray: &Ray, from: PrimitiveId, to: PrimitiveId, tolerance: f64) {
+    let limit = f64::from(ray.t_max);
+    let exact = all_hits(parts, ray);
+    let near = |t: f64, other: f64| (t - other).abs() <= tolerance * (1.0 + t.abs());
+    let sure = |hit: &&(f64, f64, PrimitiveId)| hit.1 > 1e-3 && hit.0 > tolerance && hit.0 < limit * (1.0 - 1e-5);
+    {
+        let nearest = bvh.nearest(parts, ray, from);
+        let expected = exact.iter().filter(sure).find(|hit| hit.2 != from);
+        if let Some(hit) = nearest {
+            assert!(hit.t > 0.0 && hit.t < ray.t_max);
+            assert!(hit.id != from);
+            assert!(hit.u >= 0.0 && hit.v >= 0.0 && hit.u + hit.v <= 1.0 + 1e-6);
+            let real = exact
+                .iter()
+                .find(|e| e.2 == hit.id)
+                .expect("a hit is a hit of brute force as well");
+            assert!(near(real.0, f64::from(hit.t)), "{} is not {}", hit.t, real.0);
+            if let Some(expected) = expected {
+                assert!(f64::from(hit.t) <= expected.0 || near(expected.0, f64::from(hit.t)));
+            }
+        } else {
+            assert!(expected.is_none(), "missed {expected:?} of {ray:?}");
+        }
+        let occluded = bvh.occluded(parts, ray, from, to);
+        let counts = |hit: &&(f64, f64, PrimitiveId)| hit.2 != from && hit.2 != to;
+        if occluded {
+            assert!(exact.iter().filter(counts).any(|hit| hit.0 < limit * (1.0 + 1e-5)));
+        } else {
+            assert!(!exact.iter().filter(sure).any(|hit| counts(&hit)));
+        }
+    }
+}
+
+fn random_ray(numbers: &mut Numbers) -> Ray {
+    let t_max = if numbers.unit() < 0.5 {
+        f32::INFINITY
+    } else {
+        numbers.unit() * 2.0
+    };
+    Ray {
+        origin_ws: numbers.point() * 1.5,
+        direction_ws: numbers.direction(),
+        t_max,
+    }
+}
+
+fn random_id(numbers: &mut Numbers, parts: &SceneParts) -> PrimitiveId {
+    let instance = (numbers.unit() * parts.instances.len() as f32) as u32;
+    let count = parts.meshes[parts.instances[instance as usize].mesh as usize].len();
+    PrimitiveId {
+        instance,
+        triangle: (numbers.unit() * count as f32) as u32,
+    }
+}
+
+fn check_random(parts: &SceneParts, numbers: &mut Numbers, rays: usize) {
+    let bvh = Bvh::build(parts);
+    for _ in 0..rays {
+        let ray = random_ray(numbers);
+        let (from, to) = (random_id(numbers, parts), random_id(numbers, parts));
+        check(parts, &bvh, &ray, from, to, 1e-4);
+        let first = bvh.nearest(parts, &ray, from).map_or(from, |hit| hit.id);
+        check(parts, &bvh, &ray, first, to, 1e-4);
+        check(parts, &bvh, &ray, from, first, 1e-4);
+    }
+}
+
+#[test]
+fn soups_agree_with_brute_force() {
+    let mut numbers = Numbers(1);
+    for (count, size) in [(1, 1.0), (2, 1.0), (9, 1.0), (30, 0.5), (300, 0.3), (3_000, 0.1)] {
+        let triangles = soup(&mut numbers, count, size);
+        check_random(&static_scene(&triangles), &mut numbers, 300);
+    }
+}
+
+#[test]
+fn one_sided_triangles_have_no_back() {
+    let mut numbers = Numbers(2);
+    let mut parts = static_scene(&soup(&mut numbers, 300, 0.4));
+    parts.materials.push(Material::emitter("", Vec3::ONE));
+    for (i, material) in parts.meshes[0].materials.iter_mut().enumerate() {
+        *material = i as u32 % 2;
+    }
+    check_random(&parts, &mut numbers, 1_000);
+}
+
+#[test]
+fn instances_agree_with_brute_force() {
+    let mut numbers = Numbers(3);
+    for with_fixed in [true, false] {
+        let mut parts = static_scene(&soup(&mut numbers, if with_fixed { 50 } else { 0 }, 0.3));
+        parts.materials.push(Material::emitter("", Vec3::ONE));
+        for count in [7, 40] {
+            let mut mesh = mesh_of(&soup(&mut numbers, count, 0.5));
+            mesh.materials.iter_mut().step_by(2).for_each(|material| *material = 1);
+            parts.meshes.push(mesh);
+        }
+        for i in 0..20 {
+            let size = Vec3::new(numbers.unit() + 0.1, numbers.unit() + 0.1, numbers.unit() + 0.1) * 0.3;
+            let mirror = if i % 3 == 0 {
+                Vec3::new(-1.0, 1.0, 1.0)
+            } else {
+                Vec3::ONE
+            };
+            let axis = numbers.direction();
+            let transform = Affine3A::from_scale_rotation_translation(
+                size * mirror,
+                Quat::from_axis_angle(axis, numbers.unit() * 6.0),
+                numbers.point(),
+            );
+            parts.instances.push(place(1 + i % 2, transform));
+        }
+        check_random(&parts, &mut numbers, 1_000);
+    }
+}
+
+#[test]
+fn empty_and_degenerate_scenes_are_never_hit() {
+    let p = Vec3::new(0.5, 0.25, 0.125);
+    let mut numbers = Numbers(4);
+    for triangles in [vec![], vec![[p; 3]; 20], vec![[p, p * 2.0, p * 3.0]; 20]] {
+        let parts = static_scene(&triangles);
+        let bvh = Bvh::build(&parts);
+        for _ in 0..100 {
+            let origin_ws = numbers.point();
+            let ray = Ray {
+                origin_ws,
+                direction_ws: (p - origin_ws).normalize(),
+                t_max: f32::INFINITY,
+            };
+            assert!(bvh.nearest(&parts, &ray, PrimitiveId::NONE).is_none());
+            assert!(!bvh.occluded(&parts, &ray, PrimitiveId::NONE, PrimitiveId::NONE));
+        }
+    }
+}
