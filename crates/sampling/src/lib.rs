@@ -1,1 +1,29 @@
-//! Placeholder.
+//! Random numbers, point sets, discrete distributions, Monte Carlo weights and the statistics of errors.
+//!
+//! Everything here is a pure function of its arguments: random numbers come from counters, not from state, so any
+//! thread can ask for any number in any order and gets the same answer. Directions are unit vectors; local frames have
+//! `+z` along the normal; solid angles are in steradians; uniform numbers lie in `[0, 1)`.
+//!
+//! Absent from this crate: geometry, lights, files.
+
+pub mod discrete;
+pub mod ggx;
+pub mod hash;
+pub mod hemisphere;
+pub mod mis;
+pub mod random;
+pub mod rectangle;
+pub mod sequence;
+pub mod sobol;
+pub mod statistics;
+pub mod sum;
+pub mod triangle;
+
+pub use discrete::{Discrete, Draw};
+pub use hemisphere::Frame;
+pub use random::{Random, unit_f32};
+pub use rectangle::SphericalRectangle;
+pub use sequence::{PixelSequence, VertexSequence};
+pub use statistics::Moments;
+pub use sum::PairSum;
+pub use triangle::SphericalTriangle;
