@@ -1,12 +1,96 @@
-//! Scenes with many lights, made from (name, number of lights, seed).
+//! Scenes with many lights, made from (name, number of lights, seed): the same bits on every machine.
+//!
+//! A light is a light record: an emissive triangle or a point light. A rectangular lamp is two; where the number asked
+//! for is odd, one rectangle is cut in three. Every scene has exactly as many lights as asked for.
+
+mod builder;
+mod building;
+mod dice;
+mod furnish;
+mod furniture;
+mod lamps;
+mod one_light;
+mod rooms;
 
 use crate::{SceneError, SceneParts};
+use lamps::Source;
+use std::ops::RangeInclusive;
 
-/// Makes the scene named by `what` = `NAME[:LIGHTS[:SEED]]`.
+/// A family of generated scenes.
+struct Family {
+    name: &'static str,
+    lights: RangeInclusive<usize>,
+    default: usize,
+    make: fn(usize, u32) -> SceneParts,
+}
+
+const MANY: RangeInclusive<usize> = 16..=1_000_000;
+
+const FAMILIES: &[Family] = &[
+    Family {
+        name: "rooms",
+        lights: MANY,
+        default: 2048,
+        make: |lights, seed| rooms::rooms("rooms", lights, seed, Source::Panels),
+    },
+    Family {
+        name: "points",
+        lights: MANY,
+        default: 2048,
+        make: |lights, seed| rooms::rooms("points", lights, seed, Source::Points),
+    },
+    Family {
+        name: "sun-outside",
+        lights: MANY,
+        default: 2048,
+        make: rooms::sun_outside,
+    },
+    Family {
+        name: "one-light",
+        lights: 1..=1,
+        default: 1,
+        make: |_, seed| one_light::one_light(seed),
+    },
+];
+
+/// The names of the generated scenes, in the order in which they are worth looking at.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    FAMILIES.iter().map(|family| family.name)
+}
+
+/// Makes the scene named by `what` = `NAME[:LIGHTS[:SEED]]`. It has exactly LIGHTS lights; without LIGHTS, a number
+/// that suits the scene; without SEED, seed 0.
 ///
 /// # Errors
 /// [`SceneError::Demo`] for an unknown name or a number of lights outside 16..=1,000,000 (1 for `one-light`).
 pub fn demo(what: &str) -> Result<SceneParts, SceneError> {
-    let _ = what;
-    unimplemented!("owner: generate")
+    let mut fields = what.split(':');
+    let name = fields.next().unwrap_or_default();
+    let error = |problem: String| SceneError::Demo {
+        name: what.into(),
+        problem,
+        known: names().collect::<Vec<_>>().join(", "),
+    };
+    let family = FAMILIES
+        .iter()
+        .find(|family| family.name == name)
+        .ok_or_else(|| error(format!("there is no generated scene '{name}'")))?;
+    let lights = match fields.next() {
+        None => family.default,
+        Some(field) => field
+            .parse()
+            .map_err(|_| error(format!("'{field}' is no number of lights")))?,
+    };
+    if !family.lights.contains(&lights) {
+        let (least, most) = (family.lights.start(), family.lights.end());
+        return Err(error(format!("{lights} lights asked for, {least} to {most} can be made")));
+    }
+    let seed = match fields.next() {
+        None => 0,
+        Some(field) => field.parse().map_err(|_| error(format!("'{field}' is no seed (0 to 4294967295)")))?,
+    };
+    if let Some(rest) = fields.next() {
+        return Err(error(format!("'{rest}' is one field too many, NAME[:LIGHTS[:SEED]] is read")));
+    }
+    Ok((family.make)(lights, seed))
 }

@@ -1,0 +1,320 @@
+//! A building of many furnished rooms: `rooms`, `points` and `sun-outside`.
+
+use super::building::{Opening, Plan, Room, SIDES, STOREY_HEIGHT, Shell, Side};
+use super::builder::Builder;
+use super::dice::Dice;
+use super::furniture::Palette;
+use super::furnish::{Kind, furnish};
+use super::lamps::{Lamp, Source, share};
+use crate::SceneParts;
+use glam::Vec3;
+
+/// What random numbers are drawn for.
+const LAYOUT: u32 = 1;
+const ROOM: u32 = 2;
+
+/// Distance between the wall centre lines of the room that the camera stands in, metres.
+const HERO_SIZE: [f32; 2] = [6.6, 6.2];
+
+/// `rooms` and `points`: `lights` lights behind walls and doors.
+pub(super) fn rooms(name: &str, lights: usize, seed: u32, source: Source) -> SceneParts {
+    let mut b = Builder::new(name);
+    building(&mut b, lights, seed, source);
+    b.finish()
+}
+
+/// `sun-outside`: the same with one lamp less and, outside of the closed building, one triangle of a thousand times the
+/// power of all lamps together. None of its light can reach the image.
+pub(super) fn sun_outside(lights: usize, seed: u32) -> SceneParts {
+    let mut b = Builder::new("sun-outside");
+    let size = building(&mut b, lights - 1, seed, Source::Panels);
+    b.begin("sun", "sun triangle");
+    let center = Vec3::new(0.5 * size.x, size.y + 30.0, 0.5 * size.z + 30.0);
+    let toward = (0.5 * size - center).normalize();
+    let right = toward.cross(Vec3::Y).normalize();
+    let up = right.cross(toward);
+    let half = 10.0;
+    let power = 1000.0 * b.power();
+    // Area of the triangle: 2 half^2.
+    let color = Vec3::new(1.0, 0.93, 0.8);
+    let radiance = power as f32 / (std::f32::consts::PI * 2.0 * half * half * crate::luminance(color));
+    let paint = b.emitter("sun", color * radiance);
+    b.triangle([center - right * half - up * half, center + up * half, center + right * half - up * half], paint);
+    b.finish()
+}
+
+/// How many storeys, rows and columns: about one room for every sqrt(lights) lights, at least 4, at most about 540.
+fn grid(lights: usize) -> (usize, usize, usize) {
+    let rooms = (lights as f32).sqrt().clamp(4.0, 540.0);
+    let storeys = (rooms / 32.0).ceil().min(8.0);
+    let columns = (rooms / storeys).sqrt().round().max(2.0);
+    let rows = (rooms / storeys / columns).round().max(2.0);
+    (storeys as usize, rows as usize, columns as usize)
+}
+
+/// Builds everything but a sun; returns the building's extent.
+fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Vec3 {
+    let palette = Palette::new(b);
+    let (plan, hero) = lay_out(b, lights, seed);
+    let shell = Shell {
+        ceiling: b.lambert("ceiling", [0.80, 0.79, 0.77]),
+        outside: b.lambert("render", [0.62, 0.58, 0.52]),
+        frame: palette.white,
+        skirting: palette.white,
+    };
+    plan.build(b, &shell);
+    for (index, room) in plan.rooms.iter().enumerate() {
+        let mut dice = Dice::new(&[seed, ROOM, index as u32]);
+        let kind = match hero.checked_sub(index).map(|behind| behind / plan.columns()) {
+            Some(0) if index == hero => Kind::Hero,
+            Some(1) if index + plan.columns() == hero => Kind::Dining,
+            Some(2) if index + 2 * plan.columns() == hero => Kind::Gallery,
+            _ => dice.pick(&Kind::ORDINARY),
+        };
+        furnish(b, &mut dice, &palette, room, index, kind);
+        let lights = share(lights, plan.rooms.len(), index);
+        light(b, &mut dice, &palette, room, index, kind, source, lights);
+    }
+    b.place_in_world();
+    let room = &plan.rooms[hero];
+    let eye = Vec3::new(room.high.x - 1.15, room.low.y + 1.52, room.high.z - 0.35);
+    let target = Vec3::new(room.low.x + 2.9, room.low.y + 1.16, room.low.z);
+    b.camera("hall", eye, target, 0.96);
+    Vec3::new(
+        plan.xs[plan.columns()],
+        plan.storeys as f32 * STOREY_HEIGHT,
+        plan.zs[plan.rows()],
+    )
+}
+
+/// Wall colours: mostly calm, now and then a bold one.
+const WALLS: [(&str, [f32; 3]); 9] = [
+    ("chalk wall", [0.76, 0.74, 0.70]),
+    ("cream wall", [0.76, 0.69, 0.56]),
+    ("sage wall", [0.50, 0.58, 0.44]),
+    ("dusty blue wall", [0.40, 0.52, 0.62]),
+    ("terracotta wall", [0.66, 0.34, 0.22]),
+    ("ochre wall", [0.72, 0.52, 0.22]),
+    ("blush wall", [0.74, 0.55, 0.50]),
+    ("petrol wall", [0.12, 0.33, 0.38]),
+    ("grey wall", [0.56, 0.57, 0.58]),
+];
+
+const FLOORS: [(&str, [f32; 3]); 5] = [
+    ("oak floor", [0.47, 0.31, 0.18]),
+    ("walnut floor", [0.27, 0.16, 0.10]),
+    ("pale floor", [0.60, 0.50, 0.38]),
+    ("slate floor", [0.30, 0.31, 0.33]),
+    ("stone floor", [0.58, 0.56, 0.52]),
+];
+
+/// The plan, and the index of the hero room: in the last row, so that the camera looks along a whole row of rooms.
+fn lay_out(b: &mut Builder, lights: usize, seed: u32) -> (Plan, usize) {
+    let mut dice = Dice::new(&[seed, LAYOUT]);
+    let (storeys, rows, columns) = grid(lights);
+    let hero = [columns / 2, rows - 1];
+    let lines = |dice: &mut Dice, count: usize, hero: usize, hero_size: f32| {
+        let mut lines = vec![0.0];
+        for i in 0..count {
+            let size = dice.range(4.2, 6.8);
+            lines.push(lines[i] + if i == hero { hero_size } else { size });
+        }
+        lines
+    };
+    let xs = lines(&mut dice, columns, hero[0], HERO_SIZE[0]);
+    let zs = lines(&mut dice, rows, hero[1], HERO_SIZE[1]);
+    let hero_storey = storeys / 2;
+
+    let mut rooms: Vec<Room> = Vec::with_capacity(storeys * rows * columns);
+    for storey in 0..storeys {
+        for row in 0..rows {
+            for column in 0..columns {
+                let (low, high) = Plan::bounds(&xs, &zs, storey, row, column);
+                let (wall, floor) = if storey == hero_storey && column == hero[0] {
+                    // Down the line of sight: chalk, petrol, ochre, blush, ...
+                    let (wall, floor) = [(0, 0), (7, 2), (5, 1), (6, 2)][(rows - 1 - row) % 4];
+                    (WALLS[wall], FLOORS[floor])
+                } else {
+                    (dice.pick(&WALLS), dice.pick(&FLOORS))
+                };
+                let along = |dice: &mut Dice, low: f32, high: f32| {
+                    let wide = dice.chance(0.35);
+                    let width = if wide { dice.range(1.5, 2.2) } else { 0.95 };
+                    let margin = 0.5 * width + 0.45;
+                    Opening {
+                        center: dice.range(low + margin, high - margin),
+                        width,
+                        height: if wide { 2.3 } else { 2.08 },
+                    }
+                };
+                let mut openings = [None; 4];
+                let in_sight = storey == hero_storey && column == hero[0];
+                let to_back = along(&mut dice, low.x, high.x);
+                if row > 0 {
+                    openings[Side::NegZ as usize] = if in_sight {
+                        Some(enfilade(rows - 1 - row, xs[column]))
+                    } else {
+                        dice.chance(0.75).then_some(to_back)
+                    };
+                }
+                let to_left = along(&mut dice, low.z, high.z);
+                if column > 0 {
+                    openings[Side::NegX as usize] = if in_sight && row + 1 == rows {
+                        Some(Opening {
+                            center: low.z + 1.0,
+                            width: 0.95,
+                            height: 2.08,
+                        })
+                    } else {
+                        dice.chance(0.75).then_some(to_left)
+                    };
+                }
+                rooms.push(Room {
+                    low,
+                    high,
+                    openings,
+                    wall: b.lambert(wall.0, wall.1),
+                    floor: b.lambert(floor.0, floor.1),
+                });
+            }
+        }
+    }
+    let mut plan = Plan { xs, zs, rooms, storeys };
+    share_openings(&mut plan);
+    let hero = plan.index(hero_storey, hero[1], hero[0]);
+    (plan, hero)
+}
+
+/// The doorways in the line of sight, `depth` rooms away from the hero room's.
+fn enfilade(depth: usize, x: f32) -> Opening {
+    let (center, width) = [(3.75, 2.0), (3.2, 1.6), (2.7, 1.6)][depth.min(2)];
+    Opening {
+        center: x + center,
+        width,
+        height: if depth == 0 { 2.3 } else { 2.2 },
+    }
+}
+
+/// A doorway belongs to both rooms beside it.
+fn share_openings(plan: &mut Plan) {
+    for index in 0..plan.rooms.len() {
+        let (column, row) = (index % plan.columns(), index / plan.columns() % plan.rows());
+        let [back, _, left, _] = plan.rooms[index].openings;
+        if row > 0 {
+            let behind = index - plan.columns();
+            plan.rooms[behind].openings[Side::PosZ as usize] = back;
+        }
+        if column > 0 {
+            plan.rooms[index - 1].openings[Side::PosX as usize] = left;
+        }
+    }
+}
+
+/// Lamp light, linear RGB of luminance about 1: warm, neutral, cool and a few tinted ones.
+const WARM: Vec3 = Vec3::new(1.45, 0.93, 0.42);
+pub(super) const NEUTRAL: Vec3 = Vec3::new(1.18, 0.98, 0.74);
+const COOL: Vec3 = Vec3::new(0.80, 1.02, 1.36);
+const TINTED: [Vec3; 4] = [
+    Vec3::new(1.9, 0.78, 0.25),
+    Vec3::new(0.35, 1.15, 1.35),
+    Vec3::new(1.75, 0.66, 1.1),
+    Vec3::new(0.55, 1.2, 0.75),
+];
+
+/// Hangs the lamps of one room: exactly `lights` lights.
+#[expect(clippy::too_many_arguments, reason = "called once; a struct would only rename them")]
+fn light(
+    b: &mut Builder,
+    dice: &mut Dice,
+    palette: &Palette,
+    room: &Room,
+    index: usize,
+    kind: Kind,
+    source: Source,
+    lights: usize,
+) {
+    b.place_in_world();
+    let size = room.size();
+    let (color, irradiance) = match kind {
+        Kind::Hero => (NEUTRAL, 3.2),
+        Kind::Dining => (WARM, 4.2),
+        Kind::Gallery => (COOL, 6.5),
+        _ if dice.chance(0.14) => (dice.pick(&TINTED), dice.range(1.5, 3.5)),
+        _ => (dice.pick(&[WARM, WARM, NEUTRAL, COOL]), dice.range(1.2, 6.0)),
+    };
+    // Flux that gives about this mean irradiance on the floor; the rest falls on walls and furniture.
+    let flux = color * (irradiance * size.x * size.y / 0.55);
+    let hanging = if matches!(kind, Kind::Dining | Kind::Hero | Kind::Study) && lights >= 6 { lights.div_ceil(6) } else { 0 };
+    let sconces = if lights >= 20 { (lights / 10).min(60) / 2 * 2 } else { 0 };
+    let ceiling = lights - hanging - sconces;
+
+    let place = |what: &str, i: usize| format!("room {index} / {what} {i}");
+    // Ceiling panels on a grid that follows the shape of the room.
+    let lamps = ((ceiling as f32 / 2.0).sqrt() as usize).clamp(1, 12).min(ceiling);
+    let rows = ((lamps as f32 * size.y / size.x).sqrt().round() as usize).clamp(1, lamps);
+    let long = dice.chance(0.4);
+    let mut lamp = 0;
+    for row in 0..rows {
+        let columns = share(lamps, rows, row);
+        for column in 0..columns {
+            let x = room.low.x + size.x * (column as f32 + 0.5) / columns as f32;
+            let z = room.low.z + size.y * (row as f32 + 0.5) / rows as f32;
+            let half = if long { [0.55, 0.09] } else { [0.3, 0.3] };
+            b.begin(place("ceiling lamp", lamp), "lamp panel");
+            let fixture = Lamp {
+                bottom_center: Vec3::new(x, room.high.y - 0.055, z),
+                half,
+                height: 0.06,
+                housing: palette.white,
+            };
+            let mine = share(ceiling, lamps, lamp);
+            let part = 0.72 * mine as f32 / ceiling as f32 + if hanging + sconces == 0 { 0.28 / lamps as f32 } else { 0.0 };
+            fixture.build(b, source, mine, flux * part, "ceiling light");
+            lamp += 1;
+        }
+    }
+    if hanging > 0 {
+        let pendants = if hanging < 6 { 1 } else { 3 };
+        let center = room.center();
+        for i in 0..pendants {
+            let offset = (i as f32 - 0.5 * (pendants as f32 - 1.0)) * 0.6;
+            let at = center + Vec3::new(offset, 1.72, 0.0);
+            b.begin(place("pendant lamp", i), "pendant");
+            b.bar(at + Vec3::Y * 0.1, Vec3::new(at.x, room.high.y + 0.02, at.z), 0.012, palette.dark);
+            let fixture = Lamp {
+                bottom_center: at,
+                half: [0.16, 0.16],
+                height: 0.12,
+                housing: dice.pick(&[palette.brass, palette.dark]),
+            };
+            fixture.build(b, source, share(hanging, pendants, i), WARM * (flux.element_sum() / 3.0 * 0.1), "pendant light");
+        }
+    }
+    wall_lights(b, palette, room, index, source, sconces, flux * 0.12);
+}
+
+/// Small lamps on the walls that shine down them, two for each wall that has room beside its doorway.
+fn wall_lights(b: &mut Builder, palette: &Palette, room: &Room, index: usize, source: Source, lights: usize, flux: Vec3) {
+    let lamps = lights.min(8) / 2;
+    for i in 0..lamps {
+        let side = SIDES[i % 4];
+        let length = room.length(side);
+        let along = match room.opening(side) {
+            Some(door) if door.center > 0.5 * length => 0.5 * (door.center - 0.5 * door.width),
+            Some(door) => 0.5 * (length + door.center + 0.5 * door.width),
+            None => 0.5 * length,
+        };
+        let pose = room.at_wall(side, along);
+        b.begin(format!("room {index} / wall lamp {i}"), "wall lamp");
+        b.place(pose);
+        b.cuboid([-0.03, 2.16, -0.01], [0.03, 2.26, 0.06], palette.brass);
+        let fixture = Lamp {
+            bottom_center: Vec3::new(0.0, 2.13, 0.12),
+            half: [0.1, 0.07],
+            height: 0.16,
+            housing: palette.brass,
+        };
+        fixture.build(b, source, share(lights, lamps, i), flux / lamps as f32, "wall light");
+        b.place_in_world();
+    }
+}
