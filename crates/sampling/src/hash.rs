@@ -1,4 +1,6 @@
 //! Integer hashes with full avalanche: every input bit flips every output bit with a probability close to one half.
+//!
+//! Everything is done in 32 bits, so that a shader can do exactly the same.
 
 /// Mixes 32 bits. A bijection, so different inputs never collide; 0 is mapped to itself.
 ///
@@ -13,32 +15,19 @@ pub const fn mix(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
-/// Mixes 64 bits. A bijection.
-///
-/// The finaliser of SplitMix64: Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators" (2014), with the
-/// constants of Stafford's variant 13.
-#[inline]
-pub const fn mix64(mut x: u64) -> u64 {
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
+/// 2^32 divided by the golden ratio, odd: steps of this size spread counters evenly over 32 bits.
+pub(crate) const GOLDEN: u32 = 0x9e37_79b9;
 
-/// 2^64 divided by the golden ratio, odd: steps of this size spread counters evenly over 64 bits.
-pub(crate) const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// Hashes two numbers; the order matters.
+/// Hashes two numbers; the order matters. For a given `a` a bijection of `b`.
 #[inline]
 pub const fn hash2(a: u32, b: u32) -> u32 {
-    let both = (a as u64) << 32 | b as u64;
-    (mix64(both.wrapping_add(GOLDEN)) >> 32) as u32
+    mix(mix(a.wrapping_add(GOLDEN)) ^ b)
 }
 
-/// Hashes three numbers; the order matters.
+/// Hashes three numbers; the order matters. For given `a` and `b` a bijection of `c`.
 #[inline]
 pub const fn hash3(a: u32, b: u32, c: u32) -> u32 {
-    let both = (a as u64) << 32 | b as u64;
-    (mix64(mix64(both.wrapping_add(GOLDEN)) ^ c as u64) >> 32) as u32
+    mix(hash2(a, b) ^ c)
 }
 
 #[cfg(test)]
@@ -74,7 +63,7 @@ mod tests {
         assert!(avalanche_bias(|x| hash2(x, 7)) < limit);
         assert!(avalanche_bias(|x| hash2(7, x)) < limit);
         assert!(avalanche_bias(|x| hash3(7, 8, x)) < limit);
-        assert!(avalanche_bias(|x| mix64(u64::from(x) << 16) as u32) < limit);
+        assert!(avalanche_bias(|x| hash3(x, 7, 8)) < limit);
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Counter-based random numbers: a number is a pure function of (seed, pixel, frame, dimension).
 
-use crate::hash::{GOLDEN, mix64};
+use crate::hash::{GOLDEN, hash2, hash3, mix};
 use glam::Vec2;
 
 /// Maps the top 24 bits to `[0, 1)`, exactly: every result is a multiple of 2^-24 and 1 is never reached.
@@ -15,24 +15,25 @@ pub fn unit_f32(bits: u32) -> f32 {
 /// stratified counterpart.
 #[derive(Clone, Copy, Debug)]
 pub struct Random {
-    key: u64,
+    /// Two words, so that streams do not overlap even when one of them collides.
+    key: [u32; 2],
 }
 
 impl Random {
     /// The numbers of `pixel` in `frame`. Different arguments give streams that share nothing.
     #[inline]
     pub const fn new(seed: u64, pixel: u32, frame: u32) -> Self {
-        let counter = (pixel as u64) << 32 | frame as u64;
-        // Two rounds: a seed enters only after the counter is mixed, so that seed + 1 is not pixel + 1.
+        let (low, high) = (seed as u32, (seed >> 32) as u32);
+        let stream = hash3(high, low, pixel);
         Self {
-            key: mix64(mix64(counter.wrapping_add(GOLDEN)) ^ mix64(seed)),
+            key: [hash2(stream, frame), hash2(frame, stream)],
         }
     }
 
     /// 32 random bits.
     #[inline]
     pub const fn u32(&self, dimension: u32) -> u32 {
-        (mix64(self.key.wrapping_add(GOLDEN.wrapping_mul(dimension as u64))) >> 32) as u32
+        mix(mix(self.key[0].wrapping_add(GOLDEN.wrapping_mul(dimension))) ^ self.key[1])
     }
 
     /// A number in `[0, 1)` with 24 bits.

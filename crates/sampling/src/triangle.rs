@@ -88,7 +88,7 @@ impl SphericalTriangle {
         let angle_rest = (self.sin_alpha * cos_half - self.cos_alpha * sin_half).max(0.0);
         let mut t = Vec2::new(sin_half * self.half_ab.y, angle_rest * self.half_ab.x);
         // Rounding must not carry d beyond c.
-        if !(t.x * self.half_ac.y <= t.y * self.half_ac.x) {
+        if t.x * self.half_ac.y > t.y * self.half_ac.x {
             t = self.half_ac;
         }
         let t_sq = t.length_squared().max(f32::MIN_POSITIVE);

@@ -1,0 +1,90 @@
+//! Cost of a draw of each kind, in ns: `cargo bench -p sampling`.
+//!
+//! Plain timing of loops whose results are summed; the best of several repetitions, since noise only ever adds.
+
+use glam::{Vec2, Vec3};
+use sampling::{Discrete, Frame, PixelSequence, Random, SphericalRectangle, SphericalTriangle, ggx, hemisphere};
+use std::hint::black_box;
+use std::time::Instant;
+
+/// Prints the ns per call of `draw(i)`; its result is consumed.
+fn measure<T>(name: &str, draw: impl Fn(u32) -> T) {
+    let calls = 1 << 20;
+    let best = (0..7)
+        .map(|_| {
+            let start = Instant::now();
+            for i in 0..calls {
+                black_box(draw(i));
+            }
+            start.elapsed().as_secs_f64() * 1e9 / f64::from(calls)
+        })
+        .fold(f64::INFINITY, f64::min);
+    println!("{name:48} {best:8.2} ns");
+}
+
+fn distribution(entries: u32) -> Discrete {
+    let random = Random::new(1, 2, 3);
+    let weights: Vec<f64> = (0..entries)
+        .map(|i| 10_f64.powf(6.0 * f64::from(random.f32(i))))
+        .collect();
+    Discrete::new(&weights, 0.005).expect("there are entries")
+}
+
+fn main() {
+    let seed = black_box(7);
+    measure("counter-based number", |i| Random::new(seed, i >> 6, i & 63).u32(3));
+    measure("first vertex: pixel 2, choice 1, point 2", |i| {
+        let v = PixelSequence::new(seed, i >> 6, i & 63).vertex(0);
+        (v.vec2(0), v.u32(2), v.vec2(3))
+    });
+    measure("the same from independent numbers", |i| {
+        let v = Random::new(seed, i >> 6, i & 63);
+        (v.vec2(0), v.u32(2), v.vec2(3))
+    });
+    measure("later vertex: choice 1, point 2, BSDF 3", |i| {
+        let v = PixelSequence::new(seed, i >> 6, i & 63).vertex(2);
+        (v.u32(2), v.vec2(3), v.f32(5), v.vec2(6))
+    });
+    measure("one Sobol' number", |i| {
+        PixelSequence::new(seed, 3, i & 63).vertex(0).u32(2)
+    });
+
+    for entries in [1, 64, 1000, 30_000, 1_000_000] {
+        let distribution = distribution(entries);
+        let random = Random::new(seed, 0, 0);
+        measure(&format!("number and draw among {entries}"), |i| {
+            distribution.sample(random.u32(i))
+        });
+    }
+    let weights: Vec<f64> = (0..1_000_000).map(f64::from).collect();
+    let mut distribution = distribution(1_000_000);
+    let start = Instant::now();
+    assert!(distribution.set(black_box(&weights), 0.005));
+    println!(
+        "{:48} {:8.2} ms",
+        "rebuild of 1000000 entries",
+        start.elapsed().as_secs_f64() * 1e3
+    );
+
+    let unit = |i: u32| Vec2::new(i as f32 * 0.618_034 % 1.0, i as f32 * 0.414_214 % 1.0);
+    measure("two cheap numbers (part of those below)", unit);
+    let at = |i: u32| Vec3::new(1.0, 2.0, 3.0) + unit(i).extend(0.0);
+    measure("spherical triangle, solid angle", |i| {
+        SphericalTriangle::new(at(i), at(i) + Vec3::X, at(i) + Vec3::Y)
+    });
+    measure("spherical triangle, with a sample", |i| {
+        SphericalTriangle::new(at(i), at(i) + Vec3::X, at(i) + Vec3::Y).map(|t| t.sample(unit(i)))
+    });
+    measure("spherical rectangle, with a sample", |i| {
+        SphericalRectangle::new(at(i), Vec3::X, Vec3::Y).map(|r| r.sample(unit(i)))
+    });
+    let wo = Vec3::new(0.6, 0.0, 0.8);
+    measure("cosine hemisphere in a frame", |i| {
+        let normal = Vec3::new(0.0, 0.6, 0.8);
+        Frame::new(black_box(normal)).to_world(hemisphere::cosine_hemisphere(unit(i)))
+    });
+    measure("GGX visible normal and its density", |i| {
+        let h = ggx::sample_vndf(wo, 0.2, unit(i));
+        (h, ggx::pdf_vndf(wo, h, 0.2))
+    });
+}
