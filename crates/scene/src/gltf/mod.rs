@@ -1,13 +1,218 @@
 //! glTF 2.0 in, [`SceneParts`] out.
+//!
+//! A file is not trusted: every index and byte range is checked before it is followed, and what a file unfolds to is
+//! bounded by its size. A file that is wrong is refused with the place and a remedy; a file that asks for more than
+//! this renderer does is shown without, and the report counts what is missing.
 
-use crate::{SceneError, SceneParts};
+mod accessor;
+mod bounds;
+mod cameras;
+mod census;
+mod framing;
+mod geometry;
+mod images;
+mod json;
+mod lights;
+mod materials;
+mod merge;
+mod nodes;
+mod source;
+mod tangents;
+#[cfg(test)]
+mod tests;
+
+use crate::{Mesh, SceneError, SceneParts};
+use bounds::Bounds;
+use geometry::{Budget, mesh_name};
+use merge::{Motion, append};
+use nodes::Placed;
+use source::Source;
 use std::path::Path;
+
+/// Triangles that placing a mesh again may add to the static mesh; beyond that, the mesh is instanced. Higher values make
+/// rays cheaper, lower values save memory.
+const MAX_COPIED_TRIANGLES: usize = 20_000;
 
 /// Reads a `.gltf` or `.glb` file.
 ///
 /// # Errors
 /// [`SceneError`], naming file, place and remedy.
 pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
-    let _ = path;
-    unimplemented!("owner: scene loader")
+    let source = Source::open(path)?;
+    census::refuse_required(&source)?;
+    let mut parts = SceneParts {
+        name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+        ..SceneParts::default()
+    };
+    let mut report = std::mem::take(&mut parts.report);
+    census::count_ignored(&source.json, &mut report);
+
+    let placed = nodes::walk(&source, &mut report)?;
+    let mut budget = Budget::new(source.bytes);
+    let placements = placements(&source, &placed, &mut budget)?;
+
+    let used = used_materials(&source, &placements)?;
+    let mut images = images::Images::default();
+    let (materials, needs) = materials::read(&source, &used, &mut images, &mut report)?;
+    parts.textures = images.decode(&source)?;
+    parts.materials = materials;
+    if used.last() == Some(&false) {
+        parts.materials.pop();
+    }
+
+    for (index, placements) in placements.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
+        let mesh = geometry::read_mesh(&source, index, &needs, &mut budget, &mut report)?;
+        place(&source, mesh, placements, &mut parts, &mut budget)?;
+    }
+    finish_static_mesh(&mut parts);
+
+    let bounds = Bounds::of(&parts);
+    if bounds.max.max(-bounds.min).max_element() > geometry::MAX_COORDINATE {
+        let problem = format!("geometry is placed more than {:e} m away", geometry::MAX_COORDINATE);
+        return Err(source.invalid("scene", problem, "scale the scene down"));
+    }
+    parts.punctual = lights::read(&source, &placed, &mut report)?;
+    parts.cameras = cameras::read(&source, &placed, &parts, &bounds, &mut report)?;
+    parts.report = report;
+    remark(&source, &mut parts);
+    Ok(parts)
+}
+
+/// Where each mesh of the file stands.
+fn placements(source: &Source, placed: &[Placed], budget: &mut Budget) -> Result<Vec<Vec<Placed>>, SceneError> {
+    let mut placements = vec![Vec::new(); source.json.meshes.len()];
+    for node in placed {
+        let json = &source.json.nodes[node.node];
+        let Some(mesh) = json.mesh else { continue };
+        let place = nodes::label(source, node.node);
+        let Some(list) = placements.get_mut(mesh) else {
+            return Err(source.no_such(place, "mesh", mesh, source.json.meshes.len()));
+        };
+        match &json.extensions.instancing {
+            None => list.push(*node),
+            Some(instancing) => {
+                let copies = nodes::instancing(source, node.node, instancing)?;
+                budget.take(source, &place, copies.len() as u64)?;
+                list.extend(copies.into_iter().map(|local| Placed {
+                    node: node.node,
+                    world: node.world * local,
+                }));
+            }
+        }
+    }
+    Ok(placements)
+}
+
+/// Which materials placed triangles have; the last entry is for the default material.
+fn used_materials(source: &Source, placements: &[Vec<Placed>]) -> Result<Vec<bool>, SceneError> {
+    let count = source.json.materials.len();
+    let mut used = vec![false; count + 1];
+    for (index, mesh) in source.json.meshes.iter().enumerate() {
+        for (number, primitive) in mesh.primitives.iter().enumerate() {
+            let material = primitive.material.unwrap_or(count);
+            if material > count || primitive.material == Some(count) {
+                let place = format!("mesh {index} '{}' primitive {number}", mesh_name(index, mesh));
+                return Err(source.no_such(place, "material", material, count));
+            }
+            let visible = primitive.mode.is_none_or(|mode| mode >= 4) && !placements[index].is_empty();
+            used[material] |= visible;
+        }
+    }
+    Ok(used)
+}
+
+/// Puts a mesh where it stands: copied into the static mesh 0, or, where the copies would be large, as instances.
+fn place(
+    source: &Source,
+    mut mesh: Mesh,
+    placements: &[Placed],
+    parts: &mut SceneParts,
+    budget: &mut Budget,
+) -> Result<(), SceneError> {
+    if mesh.is_empty() {
+        return Ok(());
+    }
+    if parts.meshes.is_empty() {
+        parts.meshes.push(Mesh::default());
+    }
+    let shared = (placements.len() - 1).saturating_mul(mesh.len()) > MAX_COPIED_TRIANGLES;
+    let local = parts.meshes.len() as u32;
+    let mut last_origin = None;
+    let mut instanced = false;
+    for placement in placements {
+        if last_origin != Some(placement.node) {
+            last_origin = Some(placement.node);
+            let name = source.json.nodes[placement.node].name.clone();
+            let node = name.unwrap_or_else(|| format!("node {}", placement.node));
+            parts.origins.push((node, mesh.name.clone()));
+        }
+        let origin = parts.origins.len() as u32 - 1;
+        let motion = Motion::new(placement.world);
+        if shared && !motion.is_singular() {
+            parts.instances.push(motion.instance(local, origin));
+            instanced = true;
+            continue;
+        }
+        let size = mesh.len() + mesh.positions.len();
+        budget.take(source, &nodes::label(source, placement.node), size as u64)?;
+        let fixed = &mut parts.meshes[0];
+        append(fixed, &mesh, Some(&motion));
+        fixed.materials.extend_from_slice(&mesh.materials);
+        fixed.origins.extend(std::iter::repeat_n(origin, mesh.len()));
+    }
+    if instanced {
+        mesh.materials.shrink_to_fit();
+        parts.meshes.push(mesh);
+    }
+    Ok(())
+}
+
+/// Mesh 0 becomes instance 0, or is removed if nothing went into it.
+fn finish_static_mesh(parts: &mut SceneParts) {
+    match parts.meshes.first() {
+        None => {}
+        Some(fixed) if fixed.is_empty() => {
+            parts.meshes.remove(0);
+            parts.instances.iter_mut().for_each(|instance| instance.mesh -= 1);
+        }
+        Some(_) => parts.instances.insert(0, Motion::new(glam::DAffine3::IDENTITY).instance(0, 0)),
+    }
+}
+
+/// Notes what is odd about the whole, and what is not there.
+fn remark(source: &Source, parts: &mut SceneParts) {
+    let degenerate: usize = parts.meshes.iter().map(zero_area_triangles).sum();
+    let report = &mut parts.report;
+    if degenerate > 0 {
+        report.warn(format!("{degenerate} triangles have no area: no ray meets them"));
+    }
+    if parts.instances.is_empty() {
+        report.warn("the scene has no triangles: the image will be black");
+    }
+    let emitting = |mesh: &Mesh| mesh.materials.iter().any(|&m| parts.materials[m as usize].emits());
+    if parts.punctual.is_empty() && !parts.meshes.iter().any(emitting) {
+        report.warn("the scene has no lights: the image will be black");
+    }
+    if parts.textures.is_empty() {
+        report.skipped.push("no textures: no texture coordinates, no texture look-ups".into());
+    }
+    let unused = source.json.images.len().saturating_sub(parts.textures.len());
+    if unused > 0 {
+        report.skipped.push(format!("{unused} images that no visible material needs: not decoded"));
+    }
+    if !parts.textures.is_empty() && parts.meshes.iter().all(|mesh| mesh.tangents.is_empty()) {
+        report.skipped.push("no normal maps: no tangents".into());
+    }
+    if parts.meshes.iter().all(|mesh| mesh.normals.is_empty()) {
+        report.skipped.push("no smooth normals: all triangles are flat".into());
+    }
+}
+
+fn zero_area_triangles(mesh: &Mesh) -> usize {
+    (0..mesh.len())
+        .filter(|&i| {
+            let [a, b, c] = mesh.corners(i).map(|p| p.as_dvec3());
+            (b - a).cross(c - a) == glam::DVec3::ZERO
+        })
+        .count()
 }

@@ -1,0 +1,121 @@
+//! `KHR_lights_punctual`.
+
+use super::json::{PunctualKind, PunctualLight};
+use super::nodes::{Placed, label};
+use super::source::Source;
+use crate::{Light, LightKind, LightSource, PrimitiveId, Report, SceneError, luminance};
+use glam::Vec3;
+use std::f32::consts::{FRAC_PI_2, PI};
+
+/// The punctual lights of the placed nodes.
+///
+/// # Errors
+/// [`SceneError::Invalid`] for a light that does not exist.
+pub(super) fn read(
+    source: &Source,
+    placed: &[Placed],
+    report: &mut Report,
+) -> Result<Vec<(Light, LightSource)>, SceneError> {
+    let lights = source.json.extensions.lights.as_ref().map_or(&[][..], |l| &l.lights);
+    let mut read = Vec::new();
+    for node in placed {
+        let json = &source.json.nodes[node.node];
+        let Some(reference) = &json.extensions.light else {
+            continue;
+        };
+        let place = label(source, node.node);
+        let light = lights
+            .get(reference.light)
+            .ok_or_else(|| source.no_such(&place, "light", reference.light, lights.len()))?;
+        let name = light.name.clone().unwrap_or_else(|| format!("light {}", reference.light));
+        if let Some(record) = record(light, node, &format!("{place}, light '{name}'"), report) {
+            let origin = LightSource {
+                node: json.name.clone().unwrap_or(place),
+                mesh: name,
+                material: String::new(),
+                triangle: 0,
+            };
+            read.push((record, origin));
+        }
+    }
+    Ok(read)
+}
+
+fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report) -> Option<Light> {
+    let intensity = Vec3::from(json.color.unwrap_or([1.0; 3])) * json.intensity.unwrap_or(1.0);
+    let clean = Vec3::from(intensity.to_array().map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 }));
+    if clean != intensity {
+        report.warn(format!("{place}: intensity is negative or not finite, set to 0 there"));
+    }
+    if clean == Vec3::ZERO {
+        report.warn(format!("{place}: intensity 0, left out"));
+        return None;
+    }
+    let position_ws = node.world.translation.as_vec3();
+    // Lights look along their local -z (KHR_lights_punctual, "Directional").
+    let axis_ws = (-node.world.matrix3.z_axis).normalize_or_zero().as_vec3();
+    let kind = match json.kind {
+        PunctualKind::Point => LightKind::Point,
+        PunctualKind::Spot => LightKind::Spot,
+        PunctualKind::Directional => LightKind::Directional,
+    };
+    if axis_ws == Vec3::ZERO && kind != LightKind::Point {
+        report.warn(format!("{place}: its node is scaled to nothing, so that it has no direction; left out"));
+        return None;
+    }
+    if !(position_ws.abs().max_element() <= super::geometry::MAX_COORDINATE) && kind != LightKind::Directional {
+        report.warn(format!("{place}: too far away, left out"));
+        return None;
+    }
+    let range = match json.range {
+        None => f32::INFINITY,
+        Some(range) if range > 0.0 => range,
+        Some(range) => {
+            report.warn(format!("{place}: range {range}, taken as none"));
+            f32::INFINITY
+        }
+    };
+    let (cos_inner, cos_outer) = match kind {
+        LightKind::Spot => cone(json, place, report),
+        _ => (1.0, -1.0),
+    };
+    let radiant_intensity = luminance(clean);
+    let power = match kind {
+        LightKind::Point => 4.0 * PI * radiant_intensity,
+        // The squared falloff of KHR_lights_punctual, integrated between the two angles, is a third.
+        LightKind::Spot => 2.0 * PI * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0) * radiant_intensity,
+        // Depends on the size of the scene: `Scene::new` fills it in.
+        LightKind::Directional | LightKind::Triangle => 0.0,
+    };
+    Some(Light {
+        kind,
+        double_sided: false,
+        textured: false,
+        position_ws: if kind == LightKind::Directional { Vec3::ZERO } else { position_ws },
+        edge1_ws: Vec3::ZERO,
+        edge2_ws: Vec3::ZERO,
+        normal_ws: if kind == LightKind::Point { Vec3::ZERO } else { axis_ws },
+        intensity: clean,
+        area: 0.0,
+        range: if kind == LightKind::Directional { f32::INFINITY } else { range },
+        cos_inner,
+        cos_outer,
+        power,
+        primitive: PrimitiveId::NONE,
+    })
+}
+
+/// Cosines of the inner and outer angle, 0 <= inner < outer <= pi/2.
+fn cone(json: &PunctualLight, place: &str, report: &mut Report) -> (f32, f32) {
+    let (inner, outer) = (json.spot.inner_cone_angle, json.spot.outer_cone_angle);
+    if inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-4 {
+        return (inner.cos(), outer.min(FRAC_PI_2).cos().max(0.0));
+    }
+    let fixed_outer = if outer > 0.0 { outer.min(FRAC_PI_2) } else { FRAC_PI_2 / 2.0 };
+    let fixed_inner = if inner > 0.0 { inner.min(0.99 * fixed_outer) } else { 0.0 };
+    report.warn(format!(
+        "{place}: cone angles {inner} and {outer} rad are not in order 0 <= inner < outer <= pi/2, \
+         taken as {fixed_inner} and {fixed_outer}"
+    ));
+    (fixed_inner.cos(), fixed_outer.cos().max(0.0))
+}
