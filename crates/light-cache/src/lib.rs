@@ -8,13 +8,27 @@
 //! Absent from this crate: GPU handles, windows, files, ray tracing. Deterministic for a seed at any thread count:
 //! logs are merged in the order of the image's tiles.
 
+mod dispatch;
+mod power;
+mod records;
 pub mod settings;
+mod table;
+#[cfg(test)]
+mod testing;
+mod tree;
+mod uniform;
 
 use glam::Vec3;
 use scene::Scene;
 use std::fmt::Debug;
 
+pub use dispatch::{Visitor, build};
+pub use power::PowerSampler;
+pub use records::Recording;
 pub use settings::{SamplerKind, Settings};
+pub use table::TableSampler;
+pub use tree::TreeSampler;
+pub use uniform::UniformSampler;
 
 /// What a sampler may know about the point that wants light.
 #[derive(Clone, Copy, Debug)]
@@ -112,6 +126,13 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// The probability with which [`LightSampler::sample`] draws `light` here; 0 if never.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
+
+    /// Adds the probability of every light here to `sum`, which has one entry per light.
+    fn add_pmfs(&self, local: &Self::Local<'_>, sum: &mut [f64]) {
+        for (light, sum) in (0..).zip(sum) {
+            *sum += f64::from(self.pmf(local, light));
+        }
+    }
 
     /// Learns from a frame. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);

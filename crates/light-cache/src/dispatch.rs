@@ -1,0 +1,29 @@
+//! From the name of a sampler to code made for it.
+
+use crate::{LightSampler, PowerSampler, SamplerKind, Settings, TableSampler, TreeSampler, UniformSampler};
+use scene::Scene;
+
+/// What is to be done with a sampler whatever its type: one copy of [`Visitor::visit`] is compiled per sampler, so that
+/// no call in the inner loop is virtual.
+pub trait Visitor {
+    /// What comes out.
+    type Output;
+
+    /// Does it.
+    fn visit<S: LightSampler + 'static>(self, sampler: S) -> Self::Output;
+}
+
+/// Builds the sampler of the given kind for `scene` and hands it to `visitor`. A scene with one light or none needs no
+/// choice: the visitor gets a [`UniformSampler`], which says so in its [`crate::SamplerStats::skipped`].
+pub fn build<V: Visitor>(scene: &Scene, settings: &Settings, kind: SamplerKind, visitor: V) -> V::Output {
+    let lights = &scene.lights;
+    if lights.len() < 2 {
+        return visitor.visit(UniformSampler::new(lights));
+    }
+    match kind {
+        SamplerKind::Uniform => visitor.visit(UniformSampler::new(lights)),
+        SamplerKind::Power => visitor.visit(PowerSampler::new(lights, settings)),
+        SamplerKind::Tree | SamplerKind::TreeVisible | SamplerKind::Octree => visitor.visit(TreeSampler::new(lights)),
+        SamplerKind::Table => visitor.visit(TableSampler::new(lights, settings)),
+    }
+}

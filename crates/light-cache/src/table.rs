@@ -1,0 +1,277 @@
+//! The global running importance table (Wald, Benthin and Slusallek 2003, "Interactive Global Illumination in Complex and Highly Occluded Environments").
+//!
+//! Eye paths report what each light contributes to the pixels. Per light the table keeps the running maximum, decayed every
+//! frame, and the second moment, which is what the least noisy distribution is proportional to the root of (Rath et al.
+//! 2020, "Variance-Aware Path Guiding"): with the maximum alone errors are about a third higher once learned. A light
+//! is drawn in proportion to the root of the second moment, lifted by a share of the maximum so that a light that has just
+//! turned up is drawn at once. Differs from Wald et al.: no separate estimation pass, every frame teaches the next.
+
+use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, records};
+use sampling::Discrete;
+use scene::{Light, Scene};
+use std::time::Instant;
+
+/// Samples' worth of trust in the prior, the light's power: higher values follow power longer.
+const PRIOR_SAMPLES: f64 = 2.0;
+/// Share of the running maximum in a light's weight.
+const MAX_SHARE: f64 = 0.1;
+/// Contributions above this many times the light's weight count as that many: one spike must not own the table.
+const SPIKE: f64 = 64.0;
+/// Samples of one light after which its older half is forgotten, so that the table follows changes.
+const MEMORY: f64 = 65_536.0;
+/// Lights that are ignored (if that is asked for) have been sampled this often.
+const MIN_SAMPLES_TO_IGNORE: f64 = 32.0;
+
+/// The table as a sampler: position plays no part, first hits and later hits have tables of their own.
+#[derive(Debug)]
+pub struct TableSampler {
+    primary: Table,
+    /// Like the primary one until a later hit has been seen.
+    secondary: Option<Table>,
+    prior: Vec<f64>,
+    settings: Settings,
+    frame: u32,
+    build_s: f64,
+    learn_s: f64,
+}
+
+/// What is known about one light.
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    samples: f64,
+    /// Sum of squared visible contributions.
+    sum_sq: f64,
+    /// Running maximum at the time of `frame`.
+    max: f32,
+    /// Largest contribution that counts in full.
+    spike: f32,
+    frame: u32,
+}
+
+/// One importance table.
+#[derive(Clone, Debug)]
+struct Table {
+    entries: Vec<Entry>,
+    /// `None` if there are no lights.
+    distribution: Option<Discrete>,
+    weights: Vec<f64>,
+    /// Observations since the distribution was last made.
+    fresh: usize,
+}
+
+impl TableSampler {
+    /// The table over `lights`, which starts as their power.
+    pub fn new(lights: &[Light], settings: &Settings) -> Self {
+        let start = Instant::now();
+        let strongest = lights.iter().map(|light| light.power).fold(f32::MIN_POSITIVE, f32::max);
+        let prior: Vec<f64> = lights
+            .iter()
+            .map(|light| f64::from(light.power) / f64::from(strongest))
+            .collect();
+        let floor = f64::from(settings.min_probability_mass);
+        Self {
+            primary: Table::new(&prior, floor),
+            secondary: None,
+            prior,
+            settings: settings.clone(),
+            frame: 0,
+            build_s: start.elapsed().as_secs_f64(),
+            learn_s: 0.0,
+        }
+    }
+
+    fn table(&self, primary: bool) -> &Table {
+        match &self.secondary {
+            Some(secondary) if !primary => secondary,
+            _ => &self.primary,
+        }
+    }
+
+    /// Learns from a frame; see [`LightSampler::end_frame`].
+    fn learn(&mut self, logs: &[Vec<Observation>]) {
+        let start = Instant::now();
+        self.frame += 1;
+        if self.secondary.is_none() && logs.iter().flatten().any(|o| !o.point.primary) {
+            self.secondary = Some(Table::new(&self.prior, f64::from(self.settings.min_probability_mass)));
+        }
+        for observation in logs.iter().flatten() {
+            let table = match &mut self.secondary {
+                Some(secondary) if !observation.point.primary => secondary,
+                _ => &mut self.primary,
+            };
+            table.observe(observation, self.frame, self.settings.table_decay);
+        }
+        for table in [Some(&mut self.primary), self.secondary.as_mut()].into_iter().flatten() {
+            table.refresh(&self.prior, self.frame, &self.settings);
+        }
+        self.learn_s += start.elapsed().as_secs_f64();
+    }
+}
+
+/// `max` after it has shrunk by `decay` for `frames` frames.
+fn decayed(max: f32, decay: f32, frames: u32) -> f32 {
+    max * decay.powi(frames.min(100_000) as i32)
+}
+
+impl Table {
+    fn new(prior: &[f64], floor: f64) -> Self {
+        let entry = Entry {
+            spike: f32::INFINITY,
+            ..Entry::default()
+        };
+        Self {
+            entries: vec![entry; prior.len()],
+            distribution: Discrete::new(prior, floor),
+            weights: Vec::new(),
+            fresh: 0,
+        }
+    }
+
+    fn observe(&mut self, observation: &Observation, frame: u32, decay: f32) {
+        self.fresh += 1;
+        let entry = &mut self.entries[observation.light as usize];
+        entry.samples += 1.0;
+        if !observation.visible {
+            return;
+        }
+        let contribution = observation.unshadowed.min(entry.spike);
+        entry.sum_sq += f64::from(contribution) * f64::from(contribution);
+        entry.max = decayed(entry.max, decay, frame - entry.frame).max(contribution);
+        entry.frame = frame;
+    }
+
+    /// Makes the distribution anew if enough has been observed to pay for the pass over all lights.
+    fn refresh(&mut self, prior: &[f64], frame: u32, settings: &Settings) {
+        if self.fresh == 0 || self.fresh < self.entries.len() / 4 {
+            return;
+        }
+        let Some(distribution) = &mut self.distribution else {
+            return;
+        };
+        self.fresh = 0;
+        let scale_sq = scale_sq(&self.entries, prior);
+        self.weights.clear();
+        for (entry, prior) in self.entries.iter_mut().zip(prior) {
+            if entry.samples > MEMORY {
+                entry.samples *= 0.5;
+                entry.sum_sq *= 0.5;
+            }
+            let expected_sq = scale_sq * prior * prior;
+            let mean_sq = (entry.sum_sq + PRIOR_SAMPLES * expected_sq) / (entry.samples + PRIOR_SAMPLES);
+            let max = MAX_SHARE * f64::from(decayed(entry.max, settings.table_decay, frame - entry.frame));
+            let weight = (mean_sq + max * max).sqrt();
+            entry.spike = (SPIKE * weight.max(expected_sq.sqrt())) as f32;
+            self.weights.push(weight);
+        }
+        let floor = f64::from(settings.min_probability_mass);
+        if settings.ignore_below > 0.0 {
+            ignore(
+                &mut self.weights,
+                &self.entries,
+                f64::from(settings.ignore_below),
+                floor,
+            );
+            distribution.set(&self.weights, 0.0);
+        } else {
+            distribution.set(&self.weights, floor);
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        size_of_val(&self.entries[..])
+            + size_of_val(&self.weights[..])
+            + self.distribution.as_ref().map_or(0, Discrete::bytes)
+    }
+}
+
+/// Mean over the lights seen so far of second moment / prior^2: what a unit of power is worth in the image, squared.
+/// Lights count alike, however often they were drawn, so that one strong hidden light does not speak for all.
+fn scale_sq(entries: &[Entry], prior: &[f64]) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (entry, prior) in entries.iter().zip(prior) {
+        if entry.samples > 0.0 && *prior > 0.0 {
+            let trust = entry.samples.min(16.0);
+            sum += trust * (entry.sum_sq / entry.samples) / (prior * prior);
+            count += trust;
+        }
+    }
+    if sum > 0.0 { sum / count } else { 1.0 }
+}
+
+/// Sets the weights of known lights below `share` of the mean to zero, and gives all others the floor.
+fn ignore(weights: &mut [f64], entries: &[Entry], share: f64, floor: f64) {
+    let threshold = share * weights.iter().sum::<f64>() / weights.len() as f64;
+    for (weight, entry) in weights.iter_mut().zip(entries) {
+        if entry.samples >= MIN_SAMPLES_TO_IGNORE && *weight < threshold {
+            *weight = 0.0;
+        }
+    }
+    let kept = weights.iter().filter(|&&weight| weight > 0.0).count();
+    let even = floor / (1.0 - floor).max(1e-6) * weights.iter().sum::<f64>() / kept.max(1) as f64;
+    for weight in weights.iter_mut().filter(|weight| **weight > 0.0) {
+        *weight += even;
+    }
+}
+
+impl LightSampler for TableSampler {
+    type Local<'a> = Option<&'a Discrete>;
+    const LEARNS: bool = true;
+
+    #[inline]
+    fn local(&self, _scene: &Scene, point: &ShadingPoint) -> Option<&Discrete> {
+        self.table(point.primary).distribution.as_ref()
+    }
+
+    #[inline]
+    fn sample(&self, local: &Option<&Discrete>, u: u32) -> Option<Choice> {
+        let draw = (*local)?.sample(u);
+        Some(Choice {
+            light: draw.index,
+            pmf: draw.pmf(),
+        })
+    }
+
+    #[inline]
+    fn pmf(&self, local: &Option<&Discrete>, light: u32) -> f32 {
+        local.map_or(0.0, |distribution| distribution.pmf(light))
+    }
+
+    fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
+        self.learn(logs);
+    }
+
+    fn stats(&self) -> SamplerStats {
+        let ignoring = self.settings.ignore_below > 0.0;
+        let floor = self.primary.distribution.as_ref().map_or(0.0, Discrete::floor);
+        SamplerStats {
+            bytes: self.primary.bytes()
+                + self.secondary.as_ref().map_or(0, Table::bytes)
+                + size_of_val(&self.prior[..]),
+            min_probability: if ignoring { 0.0 } else { floor },
+            build_s: self.build_s,
+            learn_s: self.learn_s,
+            skipped: if self.secondary.is_none() {
+                vec!["no later hits: no secondary table".into()]
+            } else {
+                Vec::new()
+            },
+            biased: ignoring.then(|| {
+                format!(
+                    "lights below {} of the mean importance are ignored",
+                    self.settings.ignore_below
+                )
+            }),
+            ..SamplerStats::default()
+        }
+    }
+
+    fn records(&self, scene: &Scene) -> Vec<LightRecord> {
+        let mut records = records::of_sampler(self, scene, &[]);
+        for (record, entry) in records.iter_mut().zip(&self.primary.entries) {
+            record.max_contribution =
+                f64::from(decayed(entry.max, self.settings.table_decay, self.frame - entry.frame));
+            record.samples = entry.samples as u64;
+        }
+        records
+    }
+}

@@ -1,0 +1,178 @@
+//! Lights, points and checks that the tests of all samplers share.
+
+use crate::{LightSampler, ShadingPoint};
+use glam::Vec3;
+use sampling::Random;
+use sampling::hemisphere::uniform_sphere;
+use sampling::statistics::{chi_square_p, pooled_chi_square};
+use scene::{Light, LightKind, PrimitiveId, Scene, SceneParts};
+use std::f32::consts::PI;
+
+/// A triangle light at `position`, its corners offset by `size`, facing `normal`.
+pub(crate) fn triangle(position: Vec3, normal: Vec3, size: f32, radiance: f32) -> Light {
+    let edge1 = normal.any_orthonormal_vector() * size;
+    let edge2 = normal.cross(edge1);
+    let area = 0.5 * size * size;
+    Light {
+        kind: LightKind::Triangle,
+        double_sided: false,
+        textured: false,
+        position_ws: position,
+        edge1_ws: edge1,
+        edge2_ws: edge2,
+        normal_ws: normal,
+        intensity: Vec3::splat(radiance),
+        area,
+        range: f32::INFINITY,
+        cos_inner: 1.0,
+        cos_outer: 0.0,
+        power: PI * area * radiance,
+        primitive: PrimitiveId::NONE,
+    }
+}
+
+/// A point light.
+pub(crate) fn point(position: Vec3, intensity: f32) -> Light {
+    Light {
+        kind: LightKind::Point,
+        area: 0.0,
+        edge1_ws: Vec3::ZERO,
+        edge2_ws: Vec3::ZERO,
+        normal_ws: Vec3::ZERO,
+        power: 4.0 * PI * intensity,
+        ..triangle(position, Vec3::Z, 1.0, intensity)
+    }
+}
+
+/// A light at infinity that goes along `direction`.
+pub(crate) fn directional(direction: Vec3, irradiance: f32) -> Light {
+    Light {
+        kind: LightKind::Directional,
+        normal_ws: direction.normalize(),
+        power: irradiance * PI * 100.0,
+        ..point(Vec3::ZERO, irradiance)
+    }
+}
+
+/// Lights of all kinds, directional ones first as in a scene, in a cube of side 10.
+pub(crate) fn mixed_lights(count: usize, seed: u64) -> Vec<Light> {
+    (0..count as u32)
+        .map(|i| {
+            let random = Random::new(seed, i, 0);
+            let position = Vec3::new(random.f32(0), random.f32(1), random.f32(2)) * 10.0;
+            let axis = uniform_sphere(random.vec2(3));
+            // Three decades of strength.
+            let strength = 10.0_f32.powf(3.0 * random.f32(5));
+            match i {
+                0 | 1 if count > 8 => directional(axis, strength * 0.1),
+                _ => match i % 4 {
+                    0 => point(position, strength),
+                    1 => Light {
+                        kind: LightKind::Spot,
+                        normal_ws: axis,
+                        cos_inner: 0.9,
+                        cos_outer: 0.6,
+                        range: if i % 8 == 1 { 6.0 } else { f32::INFINITY },
+                        ..point(position, strength)
+                    },
+                    2 => Light {
+                        double_sided: true,
+                        ..triangle(position, axis, 0.3, strength)
+                    },
+                    _ => triangle(position, axis, 0.5, strength),
+                },
+            }
+        })
+        .collect()
+}
+
+/// Points in and around the cube of [`mixed_lights`].
+pub(crate) fn points(count: u32, seed: u64) -> Vec<ShadingPoint> {
+    (0..count)
+        .map(|i| {
+            let random = Random::new(seed, i, 1);
+            ShadingPoint {
+                position_ws: Vec3::new(random.f32(0), random.f32(1), random.f32(2)) * 14.0 - 2.0,
+                normal_ws: uniform_sphere(random.vec2(3)),
+                primary: i % 3 != 0,
+            }
+        })
+        .collect()
+}
+
+/// A scene that has lights and nothing else.
+pub(crate) fn scene_of(lights: Vec<Light>) -> Scene {
+    let mut scene = Scene::new(SceneParts::default()).expect("an empty scene is valid");
+    scene.lights = lights;
+    scene.center_ws = Vec3::splat(5.0);
+    scene.radius = 9.0;
+    scene
+}
+
+/// What every sampler promises, at `points`: probabilities sum to 1, `sample` and `pmf` agree to the bit, larger random
+/// numbers never lead back (`monotone`), every light that can contribute can be drawn, and frequencies fit.
+pub(crate) fn check<S: LightSampler>(sampler: &S, scene: &Scene, points: &[ShadingPoint]) {
+    let count = scene.lights.len();
+    let min_probability = sampler.stats().min_probability;
+    for (index, point) in (0u32..).zip(points) {
+        let local = sampler.local(scene, point);
+        let mut pmfs = vec![0.0; count];
+        sampler.add_pmfs(&local, &mut pmfs);
+        let total = pmfs.iter().sum::<f64>();
+        let drawn = [0, 1, u32::MAX / 2, u32::MAX].map(|u| sampler.sample(&local, u));
+        if drawn[0].is_none() {
+            assert_eq!(total, 0.0, "nothing is drawn where everything has probability 0");
+            assert!(drawn.iter().all(Option::is_none));
+        } else {
+            assert!((total - 1.0).abs() < 1e-5, "probabilities sum to {total}");
+        }
+        for (light, &pmf) in pmfs.iter().enumerate() {
+            assert_eq!(pmf as f32, sampler.pmf(&local, light as u32), "add_pmfs and pmf agree");
+            if scene.lights[light].unshadowed_irradiance(point.position_ws, point.normal_ws) > 0.0 {
+                assert!(
+                    pmf > 0.0,
+                    "light {light} can contribute at {point:?} and is never drawn"
+                );
+                assert!(pmf >= min_probability * 0.999_999);
+            }
+        }
+        let draws = 4096_u32;
+        let mut observed = vec![0_u64; count];
+        for draw in 0..draws {
+            let random = Random::new(7, index, draw);
+            let u = (draw << 20) | (random.u32(0) >> 12);
+            if let Some(choice) = sampler.sample(&local, u) {
+                assert_eq!(choice.pmf, sampler.pmf(&local, choice.light), "sample and pmf agree");
+                assert!(choice.pmf > 0.0);
+                observed[choice.light as usize] += 1;
+            }
+        }
+        if total > 0.0 {
+            let expected: Vec<f64> = pmfs.iter().map(|p| p * f64::from(draws)).collect();
+            let (statistic, dof) = pooled_chi_square(&observed, &expected, 5.0);
+            // Stratified numbers fit better than independent ones, so a false alarm is rarer than 1e-6 per point.
+            assert!(
+                dof == 0 || chi_square_p(statistic, dof) > 1e-6,
+                "chi-square {statistic} of {dof}"
+            );
+        }
+    }
+}
+
+/// With stratified random numbers every light comes up as often as its probability says: the sum of 1 / (pmf n) over its draws is near 1
+/// (finds lights that are never drawn; after pbrt-v4's test of its light samplers).
+pub(crate) fn check_each_light_is_drawn<S: LightSampler>(sampler: &S, scene: &Scene, point: &ShadingPoint) {
+    let local = sampler.local(scene, point);
+    let draws = 1_u32 << 18;
+    let mut sums = vec![0.0; scene.lights.len()];
+    for draw in 0..draws {
+        let choice = sampler.sample(&local, draw << 14 | 0x1fff).expect("the point is lit");
+        sums[choice.light as usize] += 1.0 / (f64::from(choice.pmf) * f64::from(draws));
+    }
+    for (light, sum) in sums.iter().enumerate() {
+        let pmf = f64::from(sampler.pmf(&local, light as u32));
+        if pmf * f64::from(draws) > 64.0 {
+            assert!((sum - 1.0).abs() < 0.05, "light {light} of probability {pmf}: {sum}");
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! How much a light, or a group of lights, may matter at a point: irradiance in units of the strongest light.
+//!
+//! Both estimates are zero only where nothing can arrive: behind the surface, behind a one-sided emitter, outside a
+//! spot's cone or a light's range. Rounding is met with small margins on the safe side.
+
+use super::Node;
+use super::bounds::{Emission, LeafLight};
+use crate::ShadingPoint;
+use glam::Vec3;
+
+/// Share of its full strength that a light keeps just outside where it ends, against rounding at that border.
+const MARGIN: f32 = 1e-4;
+
+/// Where the light is wanted, as importance reads it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Receiver {
+    /// World position.
+    pub(crate) position: Vec3,
+    /// Unit normal.
+    pub(crate) normal: Vec3,
+}
+
+impl From<&ShadingPoint> for Receiver {
+    #[inline]
+    fn from(point: &ShadingPoint) -> Self {
+        Self {
+            position: point.position_ws,
+            normal: point.normal_ws,
+        }
+    }
+}
+
+impl Receiver {
+    /// Importance of a group: Conty Estevez and Kulla 2018, section 5, equation 3, without angles: all is done in sines and cosines.
+    ///
+    /// Differs: the squared distance is clamped by a squared length (the group's half radius), so importance does not depend on
+    /// the unit of length.
+    #[inline]
+    pub(crate) fn group(&self, node: &Node) -> f32 {
+        let to = node.center - self.position;
+        let distance_sq = to.length_squared();
+        let radius_sq = node.radius * node.radius;
+        let height = self.normal.dot(to);
+        if height + node.radius <= 0.0 {
+            return 0.0;
+        }
+        if distance_sq <= radius_sq {
+            return node.weight / distance_sq.max(0.25 * radius_sq).max(f32::MIN_POSITIVE);
+        }
+        let inverse_distance = 1.0 / distance_sq.sqrt();
+        let sin_u = node.radius * inverse_distance;
+        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
+        let cos_i = height * inverse_distance;
+        let cos_receiver = if cos_i >= cos_u {
+            1.0
+        } else {
+            cos_i * cos_u + (1.0 - cos_i * cos_i).max(0.0).sqrt() * sin_u
+        };
+        let cos_emitter = if node.cos_o <= -1.0 {
+            1.0
+        } else {
+            let cos_t = -node.axis.dot(to) * inverse_distance;
+            let sin_t = (1.0 - cos_t * cos_t).max(0.0).sqrt();
+            let (cos_x, sin_x) = if cos_t >= node.cos_o {
+                (1.0, 0.0)
+            } else {
+                (
+                    cos_t * node.cos_o + sin_t * node.sin_o,
+                    sin_t * node.cos_o - cos_t * node.sin_o,
+                )
+            };
+            let cos_x = if cos_x >= cos_u {
+                1.0
+            } else {
+                cos_x * cos_u + sin_x * sin_u
+            };
+            if cos_x <= node.cos_e {
+                return 0.0;
+            }
+            cos_x.max(MARGIN)
+        };
+        node.weight * cos_receiver.max(MARGIN) * cos_emitter / distance_sq
+    }
+
+    /// Importance of one light: its irradiance from the centre, softened where it is seen at close range, so that no
+    /// part of it is overlooked: heights above the horizon are averaged over its extent.
+    #[inline]
+    pub(crate) fn light(&self, light: &LeafLight) -> f32 {
+        let to = light.center - self.position;
+        let distance_sq = to.length_squared();
+        let radius = light.radius;
+        let height = self.normal.dot(to);
+        let emission = light.emission();
+        if emission == Emission::Point {
+            let d_sq = distance_sq.max(f32::MIN_POSITIVE.sqrt());
+            let inverse_distance = 1.0 / d_sq.sqrt();
+            let cos_axis = -light.axis.dot(to) * inverse_distance;
+            let cone = cos_axis.mul_add(light.cone_scale, light.cone_offset);
+            let relative_sq = d_sq * light.inverse_range_sq;
+            let window = 1.0 - relative_sq * relative_sq;
+            if height <= 0.0 || cone <= -MARGIN * light.cone_scale || window <= -MARGIN {
+                return 0.0;
+            }
+            let cone = cone.clamp(0.03, 1.0);
+            let inverse_cubed = inverse_distance * inverse_distance * inverse_distance;
+            return light.weight * (height * inverse_cubed) * (cone * cone) * window.max(MARGIN);
+        }
+        // Mean height over [height - radius, height + radius], what is below counted as 0.
+        let height = if height >= radius {
+            height
+        } else if height > -radius {
+            let above = height + radius;
+            above * above / (4.0 * radius)
+        } else {
+            return 0.0;
+        };
+        let radius_sq = radius * radius;
+        let plane = -light.axis.dot(to);
+        let plane = if emission == Emission::TwoSided {
+            plane.abs()
+        } else {
+            plane
+        };
+        if plane <= -MARGIN * radius {
+            return 0.0;
+        }
+        let d_sq = distance_sq.max(0.5 * radius_sq).max(f32::MIN_POSITIVE.sqrt());
+        let plane = plane.max(0.0) + 0.5 * radius * radius_sq / (d_sq + radius_sq);
+        let inverse_sq = 1.0 / d_sq;
+        light.weight * (height * inverse_sq) * (plane * inverse_sq)
+    }
+}

@@ -1,0 +1,165 @@
+//! A tree over the lights, with bounds that tell how much a group may matter at a point.
+//!
+//! Conty Estevez and Kulla 2018, "Importance Sampling of Many Lights with Adaptive Tree Splitting", without the splitting: one random
+//! number walks from the root to one light. Lights at infinity stand beside the root.
+//!
+//! Nodes lie depth first with siblings side by side, and a node's lights are a contiguous range in *tree order*, so a
+//! subtree is a range of nodes and a range of lights, and stratified random numbers choose stratified lights.
+
+mod bounds;
+mod build;
+mod importance;
+mod interval;
+mod sample;
+mod sampler;
+
+pub(crate) use bounds::LeafLight;
+pub(crate) use importance::Receiver;
+pub(crate) use interval::{PER_U32, UNIT, position, probability, split};
+pub(crate) use sample::Descent;
+pub use sampler::TreeSampler;
+
+use glam::Vec3;
+use scene::{Light, LightKind};
+
+/// [`Node::child`] of a leaf.
+pub(crate) const LEAF: u32 = u32::MAX;
+/// Lights per leaf: they are looked at one by one, which is as cheap as two more levels and more exact.
+pub(crate) const MAX_LEAF_LIGHTS: usize = 4;
+
+/// A group of lights: one cache line.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Node {
+    /// Centre of a sphere that holds all the lights, world space.
+    pub(crate) center: Vec3,
+    /// Its radius, metres.
+    pub(crate) radius: f32,
+    /// Axis of the cone of normals.
+    pub(crate) axis: Vec3,
+    /// Cosine of the cone's half angle; -1: all directions.
+    pub(crate) cos_o: f32,
+    /// Its sine.
+    pub(crate) sin_o: f32,
+    /// Cosine of the angle around each normal beyond which nothing is emitted.
+    pub(crate) cos_e: f32,
+    /// Sum of the lights' strengths, in units of the strongest.
+    pub(crate) flux: f32,
+    /// The same, each light times what was learned about it.
+    pub(crate) weight: f32,
+    /// First light, in tree order.
+    pub(crate) first: u32,
+    /// Number of lights.
+    pub(crate) count: u32,
+    /// Index of the first of two children, or [`LEAF`].
+    pub(crate) child: u32,
+    /// Index of the parent; the root is its own.
+    pub(crate) parent: u32,
+}
+
+impl Default for Node {
+    fn default() -> Self {
+        Self {
+            center: Vec3::ZERO,
+            radius: 0.0,
+            axis: Vec3::Z,
+            cos_o: -1.0,
+            sin_o: 0.0,
+            cos_e: 0.0,
+            flux: 0.0,
+            weight: 0.0,
+            first: 0,
+            count: 0,
+            child: LEAF,
+            parent: 0,
+        }
+    }
+}
+
+/// A light at infinity.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DistantLight {
+    /// Unit direction the light goes.
+    pub(crate) direction: Vec3,
+    /// Irradiance in units of the strongest light, times what was learned.
+    pub(crate) weight: f32,
+    /// Index in the scene.
+    pub(crate) index: u32,
+}
+
+/// The tree, and the lights in its order.
+#[derive(Clone, Debug)]
+pub(crate) struct Tree {
+    /// Root first; empty if there are no lights with a place.
+    pub(crate) nodes: Vec<Node>,
+    /// Lights with a place, in tree order.
+    pub(crate) leaves: Vec<LeafLight>,
+    /// Lights without: they follow the others in tree order.
+    pub(crate) distant: Vec<DistantLight>,
+    /// Tree order by scene index.
+    pub(crate) rank: Vec<u32>,
+}
+
+impl Tree {
+    /// The tree over `lights`.
+    pub(crate) fn new(lights: &[Light]) -> Self {
+        let strongest = lights.iter().map(bounds::strength).fold(0.0, f64::max);
+        let mut leaves = Vec::with_capacity(lights.len());
+        let mut distant = Vec::new();
+        for (index, light) in (0u32..).zip(lights) {
+            if light.kind == LightKind::Directional {
+                distant.push(DistantLight {
+                    direction: light.normal_ws,
+                    weight: bounds::relative_weight(bounds::strength(light), strongest),
+                    index,
+                });
+            } else {
+                leaves.push(LeafLight::new(light, index, strongest));
+            }
+        }
+        let mut nodes = build::build(&mut leaves, lights);
+        for parent in 0..nodes.len() {
+            let child = nodes[parent].child;
+            if child != LEAF {
+                nodes[child as usize].parent = parent as u32;
+                nodes[child as usize + 1].parent = parent as u32;
+            }
+        }
+        let mut rank = vec![0; lights.len()];
+        let order = leaves
+            .iter()
+            .map(LeafLight::index)
+            .chain(distant.iter().map(|d| d.index));
+        for (place, index) in (0u32..).zip(order) {
+            rank[index as usize] = place;
+        }
+        Self {
+            nodes,
+            leaves,
+            distant,
+            rank,
+        }
+    }
+
+    /// Number of lights.
+    pub(crate) fn len(&self) -> usize {
+        self.rank.len()
+    }
+
+    /// Scene index of the light at `place` in tree order.
+    #[inline]
+    pub(crate) fn light_at(&self, place: u32) -> u32 {
+        match self.leaves.get(place as usize) {
+            Some(leaf) => leaf.index(),
+            None => self.distant[place as usize - self.leaves.len()].index,
+        }
+    }
+
+    /// Bytes held.
+    pub(crate) fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..])
+            + size_of_val(&self.leaves[..])
+            + size_of_val(&self.distant[..])
+            + size_of_val(&self.rank[..])
+    }
+}

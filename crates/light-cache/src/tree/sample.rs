@@ -1,0 +1,270 @@
+//! Walking the tree: drawing a light, and the probability of one. Both cut the same interval with the same arithmetic.
+
+use super::interval::{probability, split};
+use super::{LEAF, MAX_LEAF_LIGHTS, Node, Receiver, Tree};
+
+/// Nodes that the estimate of the tree's irradiance at a point is refined to where lights at infinity compete with it.
+const REFINED_NODES: usize = 8;
+
+/// The tree as seen from one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Descent<'t> {
+    tree: &'t Tree,
+    receiver: Receiver,
+    /// Importance of all lights with a place.
+    near: f32,
+    /// Importance of all lights at infinity.
+    far: f32,
+}
+
+impl<'t> Descent<'t> {
+    /// Looks at the tree from `receiver`.
+    #[inline]
+    pub(crate) fn new(tree: &'t Tree, receiver: Receiver) -> Self {
+        let mut descent = Self {
+            tree,
+            receiver,
+            near: 0.0,
+            far: 0.0,
+        };
+        if let Some(root) = tree.nodes.first() {
+            descent.near = descent.one_level_below(root);
+        }
+        if !tree.distant.is_empty() {
+            descent.far = (0..tree.distant.len()).map(|i| descent.distant(i)).sum();
+            if descent.far > 0.0 && descent.near > 0.0 {
+                descent.near = descent.refined();
+            }
+        }
+        descent
+    }
+
+    /// Whether any light can contribute here; if not, nothing may be drawn.
+    #[inline]
+    pub(crate) fn alive(&self) -> bool {
+        self.near > 0.0 || self.far > 0.0
+    }
+
+    /// Draws a light (its place in tree order) by the position `x` in an interval of `width`; returns with it the
+    /// width that is the light's own.
+    #[inline]
+    pub(crate) fn draw(&self, mut x: u64, mut width: u64) -> (u32, u64) {
+        let near = split(width, self.near, self.far);
+        if x >= near {
+            return self.draw_distant(x - near, width - near);
+        }
+        width = near;
+        let mut node = &self.tree.nodes[0];
+        while node.child != LEAF {
+            let [first, second] = self.children(node);
+            let left = split(width, self.receiver.group(first), self.receiver.group(second));
+            (node, x, width) = if x < left {
+                (first, x, left)
+            } else {
+                (second, x - left, width - left)
+            };
+        }
+        let weights = self.leaf(node);
+        let left = split(width, weights[0] + weights[1], weights[2] + weights[3]);
+        let (pair, x, width) = if x < left {
+            (0, x, left)
+        } else {
+            (2, x - left, width - left)
+        };
+        let left = split(width, weights[pair], weights[pair + 1]);
+        let (slot, width) = if x < left {
+            (pair, left)
+        } else {
+            (pair + 1, width - left)
+        };
+        (node.first + slot as u32, width)
+    }
+
+    /// The width that the light at `place` owns of an interval of `width`.
+    #[inline]
+    pub(crate) fn width_of(&self, place: u32, mut width: u64) -> u64 {
+        let near = split(width, self.near, self.far);
+        if place as usize >= self.tree.leaves.len() {
+            return self.width_of_distant(place as usize - self.tree.leaves.len(), width - near);
+        }
+        width = near;
+        let mut node = &self.tree.nodes[0];
+        while node.child != LEAF {
+            let [first, second] = self.children(node);
+            let left = split(width, self.receiver.group(first), self.receiver.group(second));
+            (node, width) = if place < second.first {
+                (first, left)
+            } else {
+                (second, width - left)
+            };
+            if width == 0 {
+                return 0;
+            }
+        }
+        let weights = self.leaf(node);
+        let slot = (place - node.first) as usize;
+        self.width_of_slot(&weights, slot, width)
+    }
+
+    /// Adds the probability of every light of an interval of `width` to `sum`, which is in scene order.
+    pub(crate) fn add_probabilities(&self, width: u64, sum: &mut [f64]) {
+        let near = split(width, self.near, self.far);
+        for place in 0..self.tree.distant.len() {
+            let own = self.width_of_distant(place, width - near);
+            sum[self.tree.distant[place].index as usize] += f64::from(probability(own));
+        }
+        let Some(root) = self.tree.nodes.first() else { return };
+        let mut open = vec![(root, near)];
+        while let Some((node, width)) = open.pop() {
+            if width == 0 {
+                continue;
+            }
+            if node.child == LEAF {
+                let weights = self.leaf(node);
+                for slot in 0..node.count as usize {
+                    let own = self.width_of_slot(&weights, slot, width);
+                    let leaf = &self.tree.leaves[node.first as usize + slot];
+                    sum[leaf.index() as usize] += f64::from(probability(own));
+                }
+            } else {
+                let [first, second] = self.children(node);
+                let left = split(width, self.receiver.group(first), self.receiver.group(second));
+                open.extend([(second, width - left), (first, left)]);
+            }
+        }
+    }
+
+    #[inline]
+    fn children(&self, node: &Node) -> [&'t Node; 2] {
+        let pair = &self.tree.nodes[node.child as usize..][..2];
+        [&pair[0], &pair[1]]
+    }
+
+    /// Importances of a leaf's lights. If all are zero, those that exist are alike: the descent came in on bounds that
+    /// promised more, and what is drawn contributes nothing.
+    #[inline]
+    fn leaf(&self, node: &Node) -> [f32; MAX_LEAF_LIGHTS] {
+        let lights = &self.tree.leaves[node.first as usize..][..node.count as usize];
+        let mut weights = [0.0; MAX_LEAF_LIGHTS];
+        for (weight, light) in weights.iter_mut().zip(lights) {
+            *weight = self.receiver.light(light);
+        }
+        if weights.iter().all(|&weight| weight <= 0.0) {
+            weights[..lights.len()].fill(1.0);
+        }
+        weights
+    }
+
+    #[inline]
+    fn width_of_slot(&self, weights: &[f32; MAX_LEAF_LIGHTS], slot: usize, width: u64) -> u64 {
+        let left = split(width, weights[0] + weights[1], weights[2] + weights[3]);
+        let (pair, width) = if slot < 2 { (0, left) } else { (2, width - left) };
+        let left = split(width, weights[pair], weights[pair + 1]);
+        if slot == pair { left } else { width - left }
+    }
+
+    /// Importance of what lies below `node`: of its children, or of its lights.
+    #[inline]
+    fn one_level_below(&self, node: &Node) -> f32 {
+        if node.child == LEAF {
+            let lights = &self.tree.leaves[node.first as usize..][..node.count as usize];
+            lights.iter().map(|light| self.receiver.light(light)).sum()
+        } else {
+            let [first, second] = self.children(node);
+            self.receiver.group(first) + self.receiver.group(second)
+        }
+    }
+
+    /// Importance of the whole tree from several of its nodes: seen from inside, the root alone says too little.
+    fn refined(&self) -> f32 {
+        let mut nodes = [(0.0, &self.tree.nodes[0]); REFINED_NODES];
+        nodes[0].0 = self.near;
+        for used in 1..REFINED_NODES {
+            let inner = nodes[..used]
+                .iter()
+                .enumerate()
+                .filter(|(_, (_, node))| node.child != LEAF);
+            let Some((largest, _)) = inner.max_by(|(_, a), (_, b)| a.0.total_cmp(&b.0)) else {
+                break;
+            };
+            let [first, second] = self.children(nodes[largest].1);
+            nodes[largest] = (self.one_level_below(first), first);
+            nodes[used] = (self.one_level_below(second), second);
+        }
+        let sum = nodes.iter().map(|(importance, _)| importance).sum::<f32>();
+        if sum > 0.0 { sum } else { self.near }
+    }
+
+    /// Importance of a light at infinity.
+    #[inline]
+    fn distant(&self, index: usize) -> f32 {
+        let light = &self.tree.distant[index];
+        light.weight * (-self.receiver.normal.dot(light.direction)).max(0.0)
+    }
+
+    /// The lights at infinity, one after the other: scenes have few.
+    fn draw_distant(&self, x: u64, width: u64) -> (u32, u64) {
+        let mut ends = DistantEnds::new(self, width);
+        let mut start = 0;
+        let mut drawn = (0, 0);
+        for index in 0..self.tree.distant.len() {
+            let end = ends.next(self.distant(index));
+            if end > start {
+                drawn = (index, end - start);
+                if x < end {
+                    break;
+                }
+            }
+            start = end;
+        }
+        ((self.tree.leaves.len() + drawn.0) as u32, drawn.1)
+    }
+
+    fn width_of_distant(&self, index: usize, width: u64) -> u64 {
+        let mut ends = DistantEnds::new(self, width);
+        let start = (0..index).map(|i| ends.next(self.distant(i))).last().unwrap_or(0);
+        ends.next(self.distant(index)) - start
+    }
+}
+
+/// Where each light at infinity ends in an interval: running sums in `f64`, one unit set aside for each that is not zero.
+struct DistantEnds {
+    sum: f64,
+    total: f64,
+    spare: u64,
+    used: u64,
+    left: u64,
+    width: u64,
+}
+
+impl DistantEnds {
+    fn new(descent: &Descent<'_>, width: u64) -> Self {
+        let weights = || {
+            (0..descent.tree.distant.len())
+                .map(|i| descent.distant(i))
+                .filter(|&w| w > 0.0)
+        };
+        let count = weights().count() as u64;
+        Self {
+            sum: 0.0,
+            total: weights().map(f64::from).sum(),
+            spare: width.saturating_sub(count),
+            used: 0,
+            left: count,
+            width,
+        }
+    }
+
+    /// End of the next light, whose importance is `weight`.
+    fn next(&mut self, weight: f32) -> u64 {
+        if weight > 0.0 {
+            self.sum += f64::from(weight);
+            self.used += 1;
+            self.left -= 1;
+        }
+        if self.left == 0 {
+            return self.width;
+        }
+        ((self.spare as f64 * (self.sum / self.total)) as u64).min(self.spare) + self.used.min(self.width - self.spare)
+    }
+}

@@ -1,0 +1,97 @@
+//! Every light alike.
+
+use crate::records;
+use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use sampling::discrete::TOTAL;
+use scene::{Light, Scene};
+
+/// Draws every light with the same probability, up to one unit of 2^-32: the 2^32 random numbers are dealt out in whole numbers, and
+/// the first few lights get one more than the rest.
+#[derive(Clone, Debug)]
+pub struct UniformSampler {
+    /// Number of lights.
+    count: u32,
+    /// Random numbers per light; the first `longer` lights have one more.
+    units: u32,
+    longer: u32,
+    /// Where the lights with one unit less begin.
+    boundary: u64,
+    pmf_longer: f32,
+    pmf_rest: f32,
+}
+
+impl UniformSampler {
+    /// A uniform choice among `lights`.
+    pub fn new(lights: &[Light]) -> Self {
+        let count = lights.len() as u32;
+        let (units, longer) = if count == 0 {
+            (0, 0)
+        } else {
+            (TOTAL / u64::from(count), (TOTAL % u64::from(count)) as u32)
+        };
+        let probability = |units: u64| units as f32 / TOTAL as f32;
+        Self {
+            count,
+            // One light owns all 2^32 numbers, one more than fits; `sample` never divides then.
+            units: u32::try_from(units).unwrap_or(u32::MAX),
+            longer,
+            boundary: u64::from(longer) * (units + 1),
+            pmf_longer: probability(units + 1),
+            pmf_rest: probability(units),
+        }
+    }
+}
+
+impl LightSampler for UniformSampler {
+    type Local<'a> = ();
+    const LEARNS: bool = false;
+
+    #[inline]
+    fn local(&self, _scene: &Scene, _point: &ShadingPoint) {}
+
+    #[inline]
+    fn sample(&self, (): &(), u: u32) -> Option<Choice> {
+        if self.count < 2 {
+            return (self.count == 1).then_some(Choice { light: 0, pmf: 1.0 });
+        }
+        Some(if u64::from(u) < self.boundary {
+            Choice {
+                light: u / (self.units + 1),
+                pmf: self.pmf_longer,
+            }
+        } else {
+            Choice {
+                light: self.longer + (u - self.boundary as u32) / self.units,
+                pmf: self.pmf_rest,
+            }
+        })
+    }
+
+    #[inline]
+    fn pmf(&self, (): &(), light: u32) -> f32 {
+        if light < self.longer {
+            self.pmf_longer
+        } else {
+            self.pmf_rest
+        }
+    }
+
+    fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
+
+    fn stats(&self) -> SamplerStats {
+        SamplerStats {
+            bytes: size_of::<Self>(),
+            min_probability: f64::from(self.pmf_rest),
+            skipped: match self.count {
+                0 => vec!["no lights: nothing to choose".into()],
+                1 => vec!["one light: nothing to choose or to learn".into()],
+                _ => Vec::new(),
+            },
+            ..SamplerStats::default()
+        }
+    }
+
+    fn records(&self, scene: &Scene) -> Vec<LightRecord> {
+        records::of_sampler(self, scene, &[])
+    }
+}
