@@ -3,7 +3,9 @@
 //! Plain timing of loops whose results are summed; the best of several repetitions, since noise only ever adds.
 
 use glam::{Vec2, Vec3};
-use sampling::{Discrete, Frame, PixelSequence, Random, SphericalRectangle, SphericalTriangle, ggx, hemisphere};
+use sampling::{
+    Discrete, Frame, PixelSequence, Random, SphericalRectangle, SphericalTriangle, ggx, hemisphere, unit_f32,
+};
 use std::hint::black_box;
 use std::time::Instant;
 
@@ -66,7 +68,12 @@ fn main() {
         start.elapsed().as_secs_f64() * 1e3
     );
 
-    let unit = |i: u32| Vec2::new(i as f32 * 0.618_034 % 1.0, i as f32 * 0.414_214 % 1.0);
+    let unit = |i: u32| {
+        Vec2::new(
+            unit_f32(i.wrapping_mul(0x9e37_79b9)),
+            unit_f32(i.wrapping_mul(0x6a09_e667)),
+        )
+    };
     measure("two cheap numbers (part of those below)", unit);
     let at = |i: u32| Vec3::new(1.0, 2.0, 3.0) + unit(i).extend(0.0);
     measure("spherical triangle, solid angle", |i| {

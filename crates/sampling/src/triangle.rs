@@ -1,6 +1,8 @@
 //! Points on a triangle, by area and by solid angle.
 
+use crate::hemisphere::unit_circle;
 use glam::{Vec2, Vec3};
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Barycentric coordinates `(b1, b2)` of a point uniform by area; the third is `1 - b1 - b2`.
 ///
@@ -15,6 +17,28 @@ pub fn uniform_triangle(u: Vec2) -> Vec2 {
         let b2 = 0.5 * u.y;
         Vec2::new(u.x - b2, b2)
     }
+}
+
+/// The angle of `(x, y)` in `[0, pi]` for `y` at least 0, to 3e-7 relative; a third of the cost of the library's. NaN for
+/// `(0, 0)`. The polynomial interpolates `atan(z) / z` in `z^2` at the Chebyshev nodes of [0, 1].
+#[inline]
+fn atan2_upper(y: f32, x: f32) -> f32 {
+    const SERIES: [f32; 8] = [
+        0.999_999_9,
+        -0.333_318_13,
+        0.199_669_62,
+        -0.140_032_9,
+        0.098_688_655,
+        -0.058_829_753,
+        0.023_780_52,
+        -0.004_559_792,
+    ];
+    let steep = y > x.abs();
+    let z = if steep { x.abs() / y } else { y / x.abs() };
+    let z_sq = z * z;
+    let angle = z * SERIES.iter().rev().fold(0.0, |sum, &c| sum * z_sq + c);
+    let first_quadrant = if steep { FRAC_PI_2 - angle } else { angle };
+    if x < 0.0 { PI - first_quadrant } else { first_quadrant }
 }
 
 /// A triangle as seen from the origin, sampled uniformly by solid angle.
@@ -53,7 +77,7 @@ impl SphericalTriangle {
         let (dot_ab, dot_ac) = (a.dot(b), a.dot(c));
         let determinant = a.dot(edge_ab.cross(edge_ac)).abs();
         let denominator = length_a * (length_b * length_c + b.dot(c)) + dot_ab * length_c + dot_ac * length_b;
-        let solid_angle = 2.0 * determinant.atan2(denominator);
+        let solid_angle = 2.0 * atan2_upper(determinant, denominator);
         // Normals of the planes through the sides that meet at `a`; from edges, since `a x b` cancels when they are close.
         let (normal_ab, normal_ac) = (a.cross(edge_ab), a.cross(edge_ac));
         let (sin_ab, sin_ac) = (normal_ab.length(), normal_ac.length());
@@ -84,7 +108,8 @@ impl SphericalTriangle {
     #[inline]
     pub fn sample(&self, u: Vec2) -> Vec3 {
         // Cut off the share u.x of the area by a great circle from b to a point d on the side from a to c.
-        let (sin_half, cos_half) = (0.5 * self.solid_angle * u.x).sin_cos();
+        let half = unit_circle(self.solid_angle * u.x * (0.25 / PI));
+        let (sin_half, cos_half) = (half.y, half.x);
         let angle_rest = (self.sin_alpha * cos_half - self.cos_alpha * sin_half).max(0.0);
         let mut t = Vec2::new(sin_half * self.half_ab.y, angle_rest * self.half_ab.x);
         // Rounding must not carry d beyond c.
@@ -122,6 +147,22 @@ mod tests {
 
     fn unit_vector(random: &Random, d: u32) -> Vec3 {
         crate::hemisphere::uniform_sphere(random.vec2(d))
+    }
+
+    #[test]
+    fn angles_agree_with_the_library() {
+        for i in 0..=20_000 {
+            let exact = std::f64::consts::PI * f64::from(i) / 20_000.0;
+            for length in [1e-15, 1.0, 1e15] {
+                let (y, x) = ((exact.sin().max(0.0) * length) as f32, (exact.cos() * length) as f32);
+                let reference = f64::from(y).atan2(f64::from(x));
+                assert!(
+                    (f64::from(atan2_upper(y, x)) - reference).abs() <= 4e-7 * reference,
+                    "{exact}"
+                );
+            }
+        }
+        assert!(atan2_upper(0.0, 0.0).is_nan());
     }
 
     #[test]
