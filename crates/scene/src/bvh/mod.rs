@@ -18,6 +18,11 @@ mod traverse;
 use crate::{Mesh, SceneParts};
 use bounds::Bounds;
 use glam::Vec3;
+pub use kernel::Kernel;
+#[cfg(target_arch = "x86_64")]
+use kernel::avx2::Avx2;
+#[cfg(target_arch = "x86_64")]
+use kernel::avx512::Avx512;
 use kernel::portable::Portable;
 use node::Node;
 use pack::Pack;
@@ -65,8 +70,10 @@ pub struct Hit {
 }
 
 /// The acceleration structure over all instances of a scene.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Bvh {
+    /// One that this processor has.
+    kernel: Kernel,
     /// Nodes of all trees; the first one is empty.
     nodes: Vec<Node>,
     /// Triangles of all meshes; the first one is empty.
@@ -93,7 +100,10 @@ impl Bvh {
         let mut bvh = Self {
             nodes: vec![Node::new(&[], node::LEAF)],
             packs: vec![Pack::EMPTY],
-            ..Self::default()
+            fixed: None,
+            top: None,
+            placed: Vec::new(),
+            kernel: Kernel::available().pop().unwrap_or(Kernel::Portable),
         };
         let trees: Vec<_> = parts.meshes.iter().map(|mesh| bvh.add_mesh(parts, mesh)).collect();
         let mut boxes = Vec::new();
@@ -147,6 +157,7 @@ impl Bvh {
     }
 
     /// The nearest hit, or `None`. `from` is skipped (the triangle the ray starts on).
+    #[allow(unsafe_code, reason = "vector instructions")]
     pub fn nearest(&self, parts: &SceneParts, ray: &Ray, from: PrimitiveId) -> Option<Hit> {
         let query = Query {
             bvh: self,
@@ -154,14 +165,20 @@ impl Bvh {
             ray,
             skip: [from, from],
         };
-        #[allow(unsafe_code, reason = "kernels are unsafe functions")]
-        // SAFETY: any processor has what the portable kernel needs.
+        // SAFETY: `kernel` is one that this processor has.
         unsafe {
-            query.nearest::<Portable>()
+            match self.kernel {
+                Kernel::Portable => nearest_portable(&query),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx2 => nearest_avx2(&query),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx512 => nearest_avx512(&query),
+            }
         }
     }
 
     /// Whether anything but `from` and `to` is hit.
+    #[allow(unsafe_code, reason = "vector instructions")]
     pub fn occluded(&self, parts: &SceneParts, ray: &Ray, from: PrimitiveId, to: PrimitiveId) -> bool {
         let query = Query {
             bvh: self,
@@ -169,10 +186,23 @@ impl Bvh {
             ray,
             skip: [from, to],
         };
-        #[allow(unsafe_code, reason = "kernels are unsafe functions")]
-        // SAFETY: any processor has what the portable kernel needs.
+        // SAFETY: `kernel` is one that this processor has.
         unsafe {
-            query.occluded::<Portable>()
+            match self.kernel {
+                Kernel::Portable => occluded_portable(&query),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx2 => occluded_avx2(&query),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx512 => occluded_avx512(&query),
+            }
+        }
+    }
+
+    /// Uses `kernel` from now on, if this processor has it: for tests and measurements, [`Bvh::build`] takes the
+    /// fastest.
+    pub fn set_kernel(&mut self, kernel: Kernel) {
+        if Kernel::available().contains(&kernel) {
+            self.kernel = kernel;
         }
     }
 
@@ -181,6 +211,36 @@ impl Bvh {
         size_of_val(&*self.nodes) + size_of_val(&*self.packs) + size_of_val(&*self.placed)
     }
 }
+
+/// Compiles both queries for an instruction set.
+macro_rules! compile {
+    ($nearest:ident, $occluded:ident, $instructions:ty $(, $features:literal)?) => {
+        $(#[target_feature(enable = $features)])?
+        #[allow(unsafe_code, reason = "vector instructions")]
+        unsafe fn $nearest(query: &Query<'_>) -> Option<Hit> {
+            // SAFETY: the caller knows that the processor has the instructions.
+            unsafe { query.nearest::<$instructions>() }
+        }
+
+        $(#[target_feature(enable = $features)])?
+        #[allow(unsafe_code, reason = "vector instructions")]
+        unsafe fn $occluded(query: &Query<'_>) -> bool {
+            // SAFETY: the caller knows that the processor has the instructions.
+            unsafe { query.occluded::<$instructions>() }
+        }
+    };
+}
+
+compile!(nearest_portable, occluded_portable, Portable);
+#[cfg(target_arch = "x86_64")]
+compile!(nearest_avx2, occluded_avx2, Avx2, "avx2,fma,bmi1,bmi2,lzcnt");
+#[cfg(target_arch = "x86_64")]
+compile!(
+    nearest_avx512,
+    occluded_avx512,
+    Avx512,
+    "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt"
+);
 
 #[cfg(test)]
 mod tests;

@@ -1,6 +1,6 @@
 //! The two queries, in terms of [`walk`].
 
-use super::kernel::{Kernel, LocalRay, PackHits};
+use super::kernel::{Instructions, LocalRay, PackHits};
 use super::pack::{INDEX, MASKED, ONE_SIDED};
 use super::traverse::walk;
 use super::{Bvh, Hit, PrimitiveId, Ray, alpha};
@@ -20,9 +20,9 @@ impl Query<'_> {
     /// See [`Bvh::nearest`].
     ///
     /// # Safety
-    /// That of [`Kernel`].
+    /// That of [`Instructions`].
     #[inline(always)]
-    pub(super) unsafe fn nearest<K: Kernel>(&self) -> Option<Hit> {
+    pub(super) unsafe fn nearest<I: Instructions>(&self) -> Option<Hit> {
         let mut best = Hit {
             t: self.ray.t_max,
             u: 0.0,
@@ -32,7 +32,7 @@ impl Query<'_> {
         if let Some(root) = self.bvh.fixed {
             let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             // SAFETY: as the caller promises.
-            unsafe { self.nearest_in::<K>(root, 0, &local, &mut best) };
+            unsafe { self.nearest_in::<I>(root, 0, &local, &mut best) };
         }
         if let Some(root) = self.bvh.top {
             let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
@@ -40,11 +40,11 @@ impl Query<'_> {
                 let placed = &self.bvh.placed[leaf as usize];
                 let local = self.local(placed.instance);
                 // SAFETY: as the caller promises.
-                unsafe { self.nearest_in::<K>(placed.root, placed.instance, &local, &mut best) };
+                unsafe { self.nearest_in::<I>(placed.root, placed.instance, &local, &mut best) };
                 best.t
             };
             // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<K>(&self.bvh.nodes, root, &K::ray(&world), self.ray.t_max, &mut visit) };
+            unsafe { walk::<I>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visit) };
         }
         (best.id != PrimitiveId::NONE).then_some(best)
     }
@@ -52,14 +52,14 @@ impl Query<'_> {
     /// See [`Bvh::occluded`].
     ///
     /// # Safety
-    /// That of [`Kernel`].
+    /// That of [`Instructions`].
     #[inline(always)]
-    pub(super) unsafe fn occluded<K: Kernel>(&self) -> bool {
+    pub(super) unsafe fn occluded<I: Instructions>(&self) -> bool {
         let mut found = false;
         if let Some(root) = self.bvh.fixed {
             let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             // SAFETY: as the caller promises.
-            found = unsafe { self.occluded_in::<K>(root, 0, &local) };
+            found = unsafe { self.occluded_in::<I>(root, 0, &local) };
         }
         if let (Some(root), false) = (self.bvh.top, found) {
             let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
@@ -67,27 +67,27 @@ impl Query<'_> {
                 let placed = &self.bvh.placed[leaf as usize];
                 let local = self.local(placed.instance);
                 // SAFETY: as the caller promises.
-                found = unsafe { self.occluded_in::<K>(placed.root, placed.instance, &local) };
+                found = unsafe { self.occluded_in::<I>(placed.root, placed.instance, &local) };
                 if found { -1.0 } else { t_max }
             };
             // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<K>(&self.bvh.nodes, root, &K::ray(&world), self.ray.t_max, &mut visit) };
+            unsafe { walk::<I>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visit) };
         }
         found
     }
 
     /// Lowers `best` to the nearest hit in the mesh of one instance.
     #[inline(always)]
-    unsafe fn nearest_in<K: Kernel>(&self, root: u32, instance: u32, local: &LocalRay, best: &mut Hit) {
+    unsafe fn nearest_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay, best: &mut Hit) {
         let skip = self.skip_in(instance);
         let t_max = best.t;
         let mut hits = PackHits::default();
         // SAFETY: as the caller promises.
-        let ray = unsafe { K::ray(local) };
+        let ray = unsafe { I::ray(local) };
         let visit = |leaf: u32, _| {
             let pack = &self.bvh.packs[leaf as usize];
             // SAFETY: as the caller promises.
-            let mut mask = unsafe { K::triangles(&ray, pack, best.t, &mut hits) };
+            let mut mask = unsafe { I::triangles(&ray, pack, best.t, &mut hits) };
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -106,21 +106,21 @@ impl Query<'_> {
             best.t
         };
         // SAFETY: as the caller promises; `root` was made by `collapse`.
-        unsafe { walk::<K>(&self.bvh.nodes, root, &ray, t_max, visit) };
+        unsafe { walk::<I>(&self.bvh.nodes, root, &ray, t_max, visit) };
     }
 
     /// Whether anything is hit in the mesh of one instance.
     #[inline(always)]
-    unsafe fn occluded_in<K: Kernel>(&self, root: u32, instance: u32, local: &LocalRay) -> bool {
+    unsafe fn occluded_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay) -> bool {
         let skip = self.skip_in(instance);
         let mut hits = PackHits::default();
         let mut found = false;
         // SAFETY: as the caller promises.
-        let ray = unsafe { K::ray(local) };
+        let ray = unsafe { I::ray(local) };
         let visit = |leaf: u32, t_max| {
             let pack = &self.bvh.packs[leaf as usize];
             // SAFETY: as the caller promises.
-            let mut mask = unsafe { K::triangles(&ray, pack, t_max, &mut hits) };
+            let mut mask = unsafe { I::triangles(&ray, pack, t_max, &mut hits) };
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize;
                 mask &= mask - 1;
@@ -132,7 +132,7 @@ impl Query<'_> {
             t_max
         };
         // SAFETY: as the caller promises; `root` was made by `collapse`.
-        unsafe { walk::<K>(&self.bvh.nodes, root, &ray, self.ray.t_max, visit) };
+        unsafe { walk::<I>(&self.bvh.nodes, root, &ray, self.ray.t_max, visit) };
         found
     }
 

@@ -162,8 +162,10 @@ fn random_id(numbers: &mut Numbers, parts: &SceneParts) -> PrimitiveId {
 }
 
 fn check_random(parts: &SceneParts, numbers: &mut Numbers, rays: usize) {
-    let bvh = Bvh::build(parts);
-    for _ in 0..rays {
+    let mut bvh = Bvh::build(parts);
+    let kernels = Kernel::available();
+    for i in 0..rays {
+        bvh.set_kernel(kernels[i % kernels.len()]);
         let ray = random_ray(numbers);
         let (from, to) = (random_id(numbers, parts), random_id(numbers, parts));
         check(parts, &bvh, &ray, from, to, 1e-4);

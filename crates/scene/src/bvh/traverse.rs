@@ -1,7 +1,7 @@
 //! The walk through the tree, nearest child first.
 
 use super::collapse::MAX_DEPTH;
-use super::kernel::Kernel;
+use super::kernel::Instructions;
 use super::node::{LEAF, Node, WIDTH};
 use std::mem::MaybeUninit;
 
@@ -12,16 +12,16 @@ const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 /// first, and returns the new `t_max`, negative to stop.
 ///
 /// # Safety
-/// That of [`Kernel`]; and `root` must come from [`super::collapse::collapse`] into `nodes`.
+/// That of [`Instructions`]; and `root` must come from [`super::collapse::collapse`] into `nodes`.
 #[allow(
     unsafe_code,
     reason = "bounds checks and clearing the stack cost a tenth of the time"
 )]
 #[inline(always)]
-pub(super) unsafe fn walk<K: Kernel>(
+pub(super) unsafe fn walk<I: Instructions>(
     nodes: &[Node],
     root: u32,
-    ray: &K::Ray,
+    ray: &I::Ray,
     mut t_max: f32,
     mut leaf: impl FnMut(u32, f32) -> f32,
 ) {
@@ -37,7 +37,7 @@ pub(super) unsafe fn walk<K: Kernel>(
             // SAFETY: child references of inner nodes are indices into `nodes` by construction.
             let node = unsafe { nodes.get_unchecked(current as usize) };
             // SAFETY: as the caller promises.
-            let mut mask = unsafe { K::boxes(ray, node, t_max, &mut near) };
+            let mut mask = unsafe { I::boxes(ray, node, t_max, &mut near) };
             if mask != 0 {
                 let first = height;
                 while mask != 0 {

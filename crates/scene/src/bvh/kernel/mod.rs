@@ -1,10 +1,60 @@
 //! The two inner loops of ray tracing, one node and one pack of triangles at a time, once per instruction set.
 
+#[cfg(target_arch = "x86_64")]
+pub(super) mod avx2;
+#[cfg(target_arch = "x86_64")]
+pub(super) mod avx512;
 pub(super) mod portable;
 
 use super::node::{Node, WIDTH};
 use super::pack::Pack;
 use glam::Vec3;
+
+/// Which vector instructions the queries use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// Whatever the compiler makes of loops over eight numbers; any processor.
+    Portable,
+    /// AVX2 and fused multiply-add: Intel from 2013, AMD from 2015.
+    #[cfg(target_arch = "x86_64")]
+    Avx2,
+    /// AVX-512 F, VL, DQ and BW: Intel servers from 2017, AMD from 2022.
+    #[cfg(target_arch = "x86_64")]
+    Avx512,
+}
+
+impl Kernel {
+    /// Those that this processor has, the fastest last.
+    pub fn available() -> Vec<Self> {
+        #[allow(unused_mut, reason = "only x86-64 has more")]
+        let mut kernels = vec![Self::Portable];
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                kernels.push(Self::Avx2);
+                if is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512vl")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512bw")
+                {
+                    kernels.push(Self::Avx512);
+                }
+            }
+        }
+        kernels
+    }
+
+    /// Short name, for tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => "avx2",
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => "avx512",
+        }
+    }
+}
 
 /// A ray in the space of the geometry it is tested against, with everything that does not depend on the geometry.
 #[derive(Clone, Copy, Debug)]
@@ -79,7 +129,7 @@ pub(super) struct PackHits {
     unsafe_code,
     reason = "vector instructions are unsafe to use where the processor lacks them"
 )]
-pub(super) trait Kernel {
+pub(super) trait Instructions {
     /// A ray in registers.
     type Ray: Copy;
 

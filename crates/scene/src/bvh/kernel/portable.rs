@@ -1,8 +1,8 @@
 //! Plain arrays: for any processor, and what the other kernels are compared with.
 
-use super::{Kernel, LocalRay, Node, Pack, PackHits, WIDTH};
+use super::{Instructions, LocalRay, Node, Pack, PackHits, WIDTH};
 
-/// See [`Kernel`].
+/// See [`Instructions`].
 pub(in super::super) struct Portable;
 
 type Lanes = [f32; WIDTH];
@@ -13,7 +13,7 @@ fn each(f: impl Fn(usize) -> f32) -> Lanes {
 }
 
 #[allow(unsafe_code, reason = "implements an unsafe trait; nothing here is unsafe")]
-impl Kernel for Portable {
+impl Instructions for Portable {
     type Ray = LocalRay;
 
     #[inline(always)]
