@@ -7,34 +7,40 @@
 //! [`gltf`] and written in [`export`] only. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
+pub mod bsdf;
 pub mod bvh;
 pub mod camera;
 pub mod error;
 pub mod export;
 pub mod generate;
 pub mod gltf;
+mod inputs;
 pub mod instance;
 pub mod light;
 pub mod material;
 pub mod mesh;
 pub mod report;
 mod scene;
+mod shading;
 pub mod surface;
 pub mod texture;
+mod validate;
 
+pub use bsdf::{Bsdf, BsdfSample};
 pub use bvh::{Hit, PrimitiveId, Ray};
 pub use camera::Camera;
 pub use error::SceneError;
 pub use instance::Instance;
 pub use light::{Light, LightKind, LightPoint, LightSource};
-pub use material::{Bsdf, BsdfSample, Material};
+pub use material::Material;
 pub use mesh::Mesh;
 pub use report::Report;
-pub use scene::{Scene, SceneParts, load};
+pub use scene::{Counts, Scene, SceneParts, load};
 pub use surface::Surface;
 pub use texture::Texture;
 
 /// Luminance of linear Rec. 709 RGB: the scalar by which this project weighs colours.
+#[inline]
 pub fn luminance(rgb: glam::Vec3) -> f32 {
     rgb.dot(glam::Vec3::new(0.2126, 0.7152, 0.0722))
 }

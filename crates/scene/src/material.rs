@@ -1,9 +1,7 @@
-//! glTF metallic-roughness materials and their BSDF.
-//!
-//! A Lambert lobe and a GGX lobe with Schlick's Fresnel, layered as appendix B of the glTF 2.0 specification has it.
+//! glTF metallic-roughness materials. At a surface point they become a [`crate::Bsdf`].
 
 use crate::texture::TextureRef;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 
 /// A material as loaded: factors, and the textures that modulate them.
 #[derive(Clone, Debug)]
@@ -75,57 +73,5 @@ impl Material {
     /// Whether light can leave it.
     pub fn emits(&self) -> bool {
         self.emission.max_element() > 0.0
-    }
-}
-
-/// A material at one surface point: numbers only. Directions are unit, world space, and point away from the surface;
-/// `normal_ws` is the shading normal on the side of `wo`.
-#[derive(Clone, Copy, Debug)]
-pub struct Bsdf {
-    /// Shading normal on the viewer's side.
-    pub normal_ws: Vec3,
-    /// Diffuse albedo.
-    pub diffuse: Vec3,
-    /// Specular reflectance at normal incidence.
-    pub f0: Vec3,
-    /// Specular reflectance at grazing incidence.
-    pub f90: f32,
-    /// GGX alpha; meaningless where `f0` and `f90` are 0.
-    pub alpha: f32,
-}
-
-/// A direction drawn from a BSDF.
-#[derive(Clone, Copy, Debug)]
-pub struct BsdfSample {
-    /// Drawn direction.
-    pub wi_ws: Vec3,
-    /// BSDF x cosine, RGB.
-    pub value: Vec3,
-    /// Density with respect to solid angle.
-    pub pdf_solid_angle: f32,
-}
-
-impl Bsdf {
-    /// Whether there is a Lambert lobe only, so that drawing from the BSDF cannot help to find lights.
-    pub fn is_lambert(&self) -> bool {
-        self.f90 == 0.0 && self.f0 == Vec3::ZERO
-    }
-
-    /// BSDF x |cos|, RGB; 0 if `wi` lies below the shading normal.
-    pub fn eval(&self, wo_ws: Vec3, wi_ws: Vec3) -> Vec3 {
-        let _ = (wo_ws, wi_ws);
-        unimplemented!("owner: scene loader")
-    }
-
-    /// Density of [`Bsdf::sample`], solid angle.
-    pub fn pdf(&self, wo_ws: Vec3, wi_ws: Vec3) -> f32 {
-        let _ = (wo_ws, wi_ws);
-        unimplemented!("owner: scene loader")
-    }
-
-    /// Draws a direction. `u_lobe` in \[0, 1) chooses the lobe, `u` the direction. `None`: absorbed.
-    pub fn sample(&self, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let _ = (wo_ws, u_lobe, u);
-        unimplemented!("owner: scene loader")
     }
 }

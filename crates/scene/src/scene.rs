@@ -1,12 +1,18 @@
 //! The validated whole.
 
 use crate::bvh::Bvh;
+use crate::inputs::Inputs;
+use crate::light::collect::{Collected, collect};
+use crate::shading::Shading;
+use crate::validate::{texture_refs, validate};
 use crate::{
-    Camera, Hit, Instance, Light, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report, SceneError,
-    Surface, Texture,
+    Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report,
+    SceneError, Texture,
 };
 use glam::{Vec2, Vec3};
+use rayon::prelude::*;
 use std::path::Path;
+use std::time::Instant;
 
 /// What a loader or generator fills. Anyone may make one; [`Scene::new`] checks it.
 #[derive(Clone, Debug, Default)]
@@ -34,7 +40,7 @@ pub struct SceneParts {
 /// A scene ready for rendering.
 #[derive(Debug)]
 pub struct Scene {
-    /// Geometry, materials, textures, cameras, report.
+    /// Geometry, materials, textures, cameras, report. Changing them does not change what was built from them.
     pub parts: SceneParts,
     /// All lights: directional ones first, then the others along a Morton curve through their centres, so that
     /// neighbours in this order are neighbours in space and one stratified number chooses stratified lights.
@@ -45,7 +51,39 @@ pub struct Scene {
     pub radius: f32,
     /// Seconds spent in building the BVH.
     pub build_s: f64,
+    pub(crate) shading: Shading,
     bvh: Bvh,
+    /// Index into `parts.punctual` by light; empty if there are none.
+    punctual_of_light: Vec<u32>,
+    /// By mesh, the first triangle of each run of triangles that come from one primitive of the file.
+    runs: Vec<Vec<u32>>,
+}
+
+/// How much of everything there is, for `info`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct Counts {
+    /// Triangles, instanced ones as often as they are placed.
+    pub triangles: u64,
+    /// Triangles stored.
+    pub stored_triangles: u64,
+    /// Placements.
+    pub instances: u64,
+    /// Materials.
+    pub materials: u64,
+    /// Textures.
+    pub textures: u64,
+    /// Cameras.
+    pub cameras: u64,
+    /// Lights that are emissive triangles.
+    pub triangle_lights: u64,
+    /// Of these, the ones whose emission varies with a texture.
+    pub textured_lights: u64,
+    /// Point lights.
+    pub point_lights: u64,
+    /// Spot lights.
+    pub spot_lights: u64,
+    /// Directional lights.
+    pub directional_lights: u64,
 }
 
 /// Loads `what`: a path to a `.gltf` or `.glb`, or `demo:NAME[:LIGHTS[:SEED]]`.
@@ -64,10 +102,73 @@ impl Scene {
     /// Checks `parts`, collects the lights and builds the BVH.
     ///
     /// # Errors
-    /// [`SceneError::Invalid`] for an index out of range or a position that is not finite.
-    pub fn new(parts: SceneParts) -> Result<Self, SceneError> {
-        let _ = parts;
-        unimplemented!("owner: scene loader")
+    /// [`SceneError::Invalid`] for an index out of range, a stream of the wrong length or a position that is not finite.
+    /// Lesser faults are repaired, with a line in the report.
+    pub fn new(mut parts: SceneParts) -> Result<Self, SceneError> {
+        validate(&mut parts)?;
+        let mut shading = Shading::new(&parts).ok_or_else(|| SceneError::Invalid {
+            path: parts.name.clone().into(),
+            place: "scene".into(),
+            problem: "more than 2^32 - 1 triangles".into(),
+            remedy: "instance them, or split the scene".into(),
+        })?;
+        let (center, radius) = bounding_sphere(&parts);
+        let Collected { lights, punctual } = collect(&mut parts, &mut shading, radius);
+        let runs = parts.meshes.iter().map(runs).collect();
+        let start = Instant::now();
+        let bvh = Bvh::build(&parts);
+        let mut scene = Self {
+            parts,
+            lights,
+            center_ws: center,
+            radius,
+            build_s: start.elapsed().as_secs_f64(),
+            shading,
+            bvh,
+            punctual_of_light: punctual,
+            runs,
+        };
+        scene.tell_skipped();
+        Ok(scene)
+    }
+
+    /// Enters into the report what this scene does not need.
+    fn tell_skipped(&mut self) {
+        let parts = &self.parts;
+        let masked = |m: &Material| m.alpha_cutoff.is_some();
+        let flat = parts.meshes.iter().all(|mesh| mesh.normals.is_empty());
+        let placed_once = parts.instances.iter().all(|instance| instance.identity);
+        let lambert = self
+            .shading
+            .materials
+            .iter()
+            .all(|m| m.f90 == 0.0 && m.f0 == Vec3::ZERO);
+        let textured = |m: &Material| texture_refs(m).iter().any(Option::is_some);
+        let unneeded = [
+            (
+                !parts.materials.iter().any(textured),
+                "no textures: no texture coordinates, no lookups",
+            ),
+            (
+                !parts.materials.iter().any(masked),
+                "no alpha masks: rays stop at the first triangle",
+            ),
+            (placed_once, "no instancing: rays are not transformed"),
+            (flat, "no smooth normals: no interpolation"),
+            (lambert, "no glossy materials: lights are not looked for by reflection"),
+            (self.lights.is_empty(), "no lights: no shadow rays"),
+            (self.lights.len() == 1, "one light: nothing to choose, nothing to learn"),
+        ];
+        let lines = unneeded
+            .into_iter()
+            .filter(|(unneeded, _)| *unneeded)
+            .map(|(_, line)| line.to_owned());
+        self.parts.report.skipped.extend(lines);
+    }
+
+    /// The acceleration structure.
+    pub fn bvh(&self) -> &Bvh {
+        &self.bvh
     }
 
     /// The nearest visible surface along the ray; `from` is the triangle it starts on.
@@ -82,29 +183,73 @@ impl Scene {
         self.bvh.occluded(&self.parts, ray, from, to)
     }
 
-    /// Everything shading needs to know about a hit.
-    pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
-        let _ = (ray, hit);
-        unimplemented!("owner: scene loader")
-    }
-
-    /// A ray that leaves `surface` towards `wi_ws`, its origin moved off the surface by a few units in the last place
-    /// (Waechter and Binder, Ray Tracing Gems 2019, chapter 6) on the side of `wi_ws`.
-    pub fn ray_from(&self, surface: &Surface, wi_ws: Vec3, t_max: f32) -> Ray {
-        let _ = (surface, wi_ws, t_max);
-        unimplemented!("owner: scene loader")
-    }
-
     /// The light at `index` as a triangle's hit sees it, texture included: [`Light::sample`] with the exact texel.
+    #[inline]
     pub fn sample_light(&self, index: u32, from_ws: Vec3, u: Vec2) -> Option<LightPoint> {
-        let _ = (index, from_ws, u);
-        unimplemented!("owner: scene loader")
+        let light = &self.lights[index as usize];
+        let point = light.sample(from_ws, u)?;
+        if light.textured {
+            self.with_texel(light, from_ws, point)
+        } else {
+            Some(point)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn with_texel(&self, light: &Light, from_ws: Vec3, point: LightPoint) -> Option<LightPoint> {
+        let PrimitiveId { instance, triangle } = light.primitive;
+        let mesh = &self.parts.meshes[self.parts.instances[instance as usize].mesh as usize];
+        let material = &self.parts.materials[mesh.materials[triangle as usize] as usize];
+        let at = light.barycentrics(from_ws, point.wi_ws, point.distance);
+        let radiance = Inputs::at(mesh, triangle as usize, at.x, at.y).emission(&self.parts.textures, material);
+        (radiance != Vec3::ZERO).then_some(LightPoint { radiance, ..point })
     }
 
     /// Where light `index` comes from.
     pub fn light_source(&self, index: u32) -> LightSource {
-        let _ = index;
-        unimplemented!("owner: scene loader")
+        let PrimitiveId { instance, triangle } = self.lights[index as usize].primitive;
+        let Some(instance) = self.parts.instances.get(instance as usize) else {
+            let punctual = self.punctual_of_light[index as usize];
+            return self.parts.punctual[punctual as usize].1.clone();
+        };
+        let mesh = &self.parts.meshes[instance.mesh as usize];
+        let origin = mesh.origins.get(triangle as usize).copied().unwrap_or(instance.origin);
+        let (node, mesh_name) = self.parts.origins[origin as usize].clone();
+        let runs = &self.runs[instance.mesh as usize];
+        let run = runs.partition_point(|&first| first <= triangle) - 1;
+        LightSource {
+            node,
+            mesh: mesh_name,
+            material: self.parts.materials[mesh.materials[triangle as usize] as usize]
+                .name
+                .clone(),
+            triangle: triangle - runs[run],
+        }
+    }
+
+    /// How much of everything there is.
+    pub fn counts(&self) -> Counts {
+        let parts = &self.parts;
+        let mut counts = Counts {
+            triangles: self.triangle_count(),
+            stored_triangles: parts.meshes.iter().map(|mesh| mesh.len() as u64).sum(),
+            instances: parts.instances.len() as u64,
+            materials: parts.materials.len() as u64,
+            textures: parts.textures.len() as u64,
+            cameras: parts.cameras.len() as u64,
+            ..Counts::default()
+        };
+        for light in &self.lights {
+            counts.textured_lights += u64::from(light.textured);
+            *match light.kind {
+                LightKind::Triangle => &mut counts.triangle_lights,
+                LightKind::Point => &mut counts.point_lights,
+                LightKind::Spot => &mut counts.spot_lights,
+                LightKind::Directional => &mut counts.directional_lights,
+            } += 1;
+        }
+        counts
     }
 
     /// Triangles, instanced ones counted as often as they are placed.
@@ -115,4 +260,52 @@ impl Scene {
             .map(|i| self.parts.meshes[i.mesh as usize].len() as u64)
             .sum()
     }
+}
+
+/// Centre and radius of the sphere around the bounding box of everything placed, in f64 on the way: squares of large
+/// coordinates, and differences of close ones.
+fn bounding_sphere(parts: &SceneParts) -> (Vec3, f32) {
+    let nothing = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
+    // Vertices that no triangle uses do not count.
+    let bounds_of = |mesh: &Mesh| {
+        let vertices = mesh
+            .indices
+            .par_iter()
+            .flatten_iter()
+            .map(|&v| mesh.positions[v as usize]);
+        vertices.map(|p| (p, p)).reduce(nothing, join)
+    };
+    let local: Vec<(Vec3, Vec3)> = parts.meshes.iter().map(bounds_of).collect();
+    let mut bounds = nothing();
+    for instance in &parts.instances {
+        let (least, most) = local[instance.mesh as usize];
+        if least.x > most.x {
+            continue;
+        }
+        for corner in 0..8 {
+            let pick = Vec3::select(
+                glam::BVec3::from_array([1, 2, 4].map(|bit| corner & bit != 0)),
+                most,
+                least,
+            );
+            let placed = instance.world_from_local.transform_point3(pick);
+            bounds = join(bounds, (placed, placed));
+        }
+    }
+    if bounds.0.x > bounds.1.x {
+        return (Vec3::ZERO, f32::MIN_POSITIVE.sqrt());
+    }
+    let (least, most) = (bounds.0.as_dvec3(), bounds.1.as_dvec3());
+    let radius = (0.5 * (most - least).length()).clamp(f64::from(f32::MIN_POSITIVE.sqrt()), f64::from(f32::MAX));
+    ((0.5 * (least + most)).as_vec3(), radius as f32)
+}
+
+/// First triangles of the runs with one origin and one material: what was one primitive in the file.
+fn runs(mesh: &Mesh) -> Vec<u32> {
+    let key = |i: usize| (mesh.origins.get(i), mesh.materials[i]);
+    (0..mesh.len())
+        .filter(|&i| i == 0 || key(i) != key(i - 1))
+        .map(|i| i as u32)
+        .collect()
 }

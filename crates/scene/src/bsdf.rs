@@ -1,0 +1,175 @@
+//! The BSDF: a Lambert lobe under a GGX lobe.
+
+use glam::{Vec2, Vec3};
+use sampling::hemisphere::{Frame, cosine_hemisphere};
+use std::f32::consts::{FRAC_1_PI, PI};
+
+/// Least GGX alpha: smoother surfaces are rendered as this smooth (a lobe of 0.06 degrees), so that values and densities stay finite.
+pub const MIN_ALPHA: f32 = 1e-3;
+
+/// A material at one surface point: numbers only. Directions are unit, world space, and point away from the surface;
+/// `normal_ws` is the shading normal on the side of `wo`.
+///
+/// The specular lobe is that of appendix B of the glTF 2.0 specification: GGX with height-correlated masking and Schlick's
+/// Fresnel of the half vector; single scattering, so rough metals lose some energy. The diffuse lobe differs: the appendix
+/// weighs it by 1 - F of the half vector, which at grazing angles sends out up to 1.6 times the light that comes in. Here it is
+/// weighed by (1 - F(n.l)) (1 - F(n.v)), scaled so that all that is not reflected specularly reaches it (P. Shirley,
+/// B. Smits, H. Hu, E. Lafortune, "A Practitioners' Assessment of Light Reflection Models", Pacific Graphics 1997, section 4):
+/// reciprocal, never gains, and equal to the appendix for light and view near the normal but for 4 percent.
+#[derive(Clone, Copy, Debug)]
+pub struct Bsdf {
+    /// Shading normal on the viewer's side.
+    pub normal_ws: Vec3,
+    /// Diffuse albedo.
+    pub diffuse: Vec3,
+    /// Specular reflectance at normal incidence.
+    pub f0: Vec3,
+    /// Specular reflectance at grazing incidence.
+    pub f90: f32,
+    /// GGX alpha, at least [`MIN_ALPHA`]; meaningless where `f0` and `f90` are 0.
+    pub alpha: f32,
+}
+
+/// A direction drawn from a BSDF.
+#[derive(Clone, Copy, Debug)]
+pub struct BsdfSample {
+    /// Drawn direction.
+    pub wi_ws: Vec3,
+    /// BSDF x cosine, RGB.
+    pub value: Vec3,
+    /// Density with respect to solid angle.
+    pub pdf_solid_angle: f32,
+}
+
+impl Bsdf {
+    /// Whether there is a Lambert lobe only, so that drawing from the BSDF cannot help to find lights.
+    #[inline]
+    pub fn is_lambert(&self) -> bool {
+        self.f90 == 0.0 && self.f0 == Vec3::ZERO
+    }
+
+    /// BSDF x |cos|, RGB; 0 if `wi` or `wo` lies below the shading normal.
+    #[inline]
+    pub fn eval(&self, wo_ws: Vec3, wi_ws: Vec3) -> Vec3 {
+        self.eval_pdf(wo_ws, wi_ws).0
+    }
+
+    /// Density of [`Bsdf::sample`], solid angle.
+    #[inline]
+    pub fn pdf(&self, wo_ws: Vec3, wi_ws: Vec3) -> f32 {
+        self.eval_pdf(wo_ws, wi_ws).1
+    }
+
+    /// [`Bsdf::eval`] and [`Bsdf::pdf`] together, which share most of their work.
+    #[inline]
+    pub fn eval_pdf(&self, wo_ws: Vec3, wi_ws: Vec3) -> (Vec3, f32) {
+        let cos_i = self.normal_ws.dot(wi_ws);
+        if cos_i <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let lambert = cos_i * FRAC_1_PI;
+        if self.is_lambert() {
+            return (self.diffuse * lambert, lambert);
+        }
+        self.layered(wo_ws, wi_ws, cos_i)
+    }
+
+    /// Draws a direction. `u_lobe` in \[0, 1) chooses the lobe, `u` the direction. `None`: absorbed.
+    #[inline]
+    pub fn sample(&self, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let frame = Frame::new(self.normal_ws);
+        if self.is_lambert() {
+            let local = cosine_hemisphere(u);
+            let lambert = local.z * FRAC_1_PI;
+            return Some(BsdfSample {
+                wi_ws: frame.to_world(local),
+                value: self.diffuse * lambert,
+                pdf_solid_angle: lambert,
+            });
+        }
+        self.sample_layered(&frame, wo_ws, u_lobe, u)
+    }
+
+    /// Schlick's approximation.
+    #[inline]
+    fn fresnel(&self, cosine: f32) -> Vec3 {
+        let away = (1.0 - cosine).clamp(0.0, 1.0);
+        let fifth = (away * away) * (away * away) * away;
+        self.f0 + (Vec3::splat(self.f90) - self.f0) * fifth
+    }
+
+    /// Probability of the specular lobe: its share of the albedo from `wo`, a smooth surface assumed. At least 0.1 and at most
+    /// 0.9 while both lobes are there, since masking and tinted light shift the true shares.
+    #[inline]
+    fn specular_probability(&self, fresnel_o: Vec3) -> f32 {
+        let specular = fresnel_o.max_element();
+        let diffuse = self.diffuse.max_element() * (1.0 - specular);
+        if diffuse <= 0.0 {
+            return 1.0;
+        }
+        (specular / (specular + diffuse)).clamp(0.1, 0.9)
+    }
+
+    fn layered(&self, wo_ws: Vec3, wi_ws: Vec3, cos_i: f32) -> (Vec3, f32) {
+        let cos_o = self.normal_ws.dot(wo_ws);
+        let half = wo_ws + wi_ws;
+        let half_length_sq = half.length_squared();
+        if cos_o <= 0.0 || half_length_sq <= 0.0 {
+            return (Vec3::ZERO, 0.0);
+        }
+        let half = half / half_length_sq.sqrt();
+        let alpha_sq = self.alpha * self.alpha;
+        // The sine from the cross product: near the peak of a narrow lobe the cosine has no digits left.
+        let (cos_h, sin_h_sq) = (self.normal_ws.dot(half), self.normal_ws.cross(half).length_squared());
+        let t = sin_h_sq + cos_h * cos_h * alpha_sq;
+        let d = alpha_sq / t / (PI * t);
+        // Smith's masking as area seen from each direction: (1 + 2 Lambda) cos.
+        let seen_o = (cos_o * cos_o + alpha_sq * (1.0 - cos_o * cos_o).max(0.0)).sqrt();
+        let seen_i = (cos_i * cos_i + alpha_sq * (1.0 - cos_i * cos_i).max(0.0)).sqrt();
+        let visibility = 0.5 / (cos_i * seen_o + cos_o * seen_i);
+        let fresnel_o = self.fresnel(cos_o);
+        let specular = self.fresnel(wo_ws.dot(half)) * (d * visibility * cos_i);
+        let pdf_specular = d / (2.0 * (cos_o + seen_o));
+        let lambert = cos_i * FRAC_1_PI;
+        let probability = self.specular_probability(fresnel_o);
+        let pdf = probability * pdf_specular + (1.0 - probability) * lambert;
+        let diffuse = self.diffuse * (self.coupling(cos_i, fresnel_o) * lambert);
+        (specular + diffuse, pdf)
+    }
+
+    /// Factor of the diffuse lobe: (1 - F(n.l)) (1 - F(n.v)) over the mean of 1 - F on the cosine-weighted hemisphere. By the
+    /// largest channel, so that a tinted coat does not tint what is below.
+    #[inline]
+    fn coupling(&self, cos_i: f32, fresnel_o: Vec3) -> f32 {
+        let f0 = self.f0.max_element();
+        // Schlick's fifth power has the mean 1 / 21.
+        let mean = 1.0 - f0 - (self.f90 - f0) * (1.0 / 21.0);
+        let passing_i = 1.0 - self.fresnel(cos_i).max_element();
+        let passing_o = 1.0 - fresnel_o.max_element();
+        // A mirror lets nothing pass: no share of nothing.
+        if mean > 1e-6 {
+            (passing_i * passing_o).max(0.0) / mean
+        } else {
+            0.0
+        }
+    }
+
+    fn sample_layered(&self, frame: &Frame, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let cos_o = self.normal_ws.dot(wo_ws);
+        let wi_ws = if u_lobe < self.specular_probability(self.fresnel(cos_o)) {
+            let wo = frame.to_local(wo_ws);
+            let half = sampling::ggx::sample_vndf(wo, self.alpha, u);
+            frame.to_world(half * (2.0 * wo.dot(half)) - wo).normalize()
+        } else {
+            frame.to_world(cosine_hemisphere(u))
+        };
+        let (value, pdf_solid_angle) = self.eval_pdf(wo_ws, wi_ws);
+        // False for NaN.
+        let usable = pdf_solid_angle > 0.0 && pdf_solid_angle < f32::INFINITY && value.is_finite();
+        usable.then_some(BsdfSample {
+            wi_ws,
+            value,
+            pdf_solid_angle,
+        })
+    }
+}
