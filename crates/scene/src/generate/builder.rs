@@ -55,7 +55,14 @@ pub(super) struct Builder {
 
 /// Corners of a box by bit: 1 = high x, 2 = high y, 4 = high z. Faces -x, +x, -y, +y, -z, +z, counter-clockwise from
 /// outside.
-const BOX_FACES: [[usize; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+const BOX_FACES: [[usize; 4]; 6] = [
+    [0, 4, 6, 2],
+    [1, 3, 7, 5],
+    [0, 1, 5, 4],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 5, 7, 6],
+];
 
 impl Builder {
     pub(super) fn new(name: &str) -> Self {
@@ -81,10 +88,21 @@ impl Builder {
     }
 
     fn paint(&mut self, material: Material) -> Paint {
-        let color = if material.emits() { material.emission } else { material.base_color };
+        let color = if material.emits() {
+            material.emission
+        } else {
+            material.base_color
+        };
         let kind = if material.emits() { -1.0 } else { material.metallic };
         let [r, g, b] = color.to_array().map(f32::to_bits);
-        let key = [r, g, b, kind.to_bits(), material.roughness.to_bits(), material.dielectric_f90.to_bits()];
+        let key = [
+            r,
+            g,
+            b,
+            kind.to_bits(),
+            material.roughness.to_bits(),
+            material.dielectric_f90.to_bits(),
+        ];
         let materials = &mut self.parts.materials;
         *self.paints.entry(key).or_insert_with(|| {
             materials.push(material);
@@ -259,6 +277,18 @@ impl Builder {
         self.ellipsoid(center, Vec3::splat(radius), segments, segments / 2, paint);
     }
 
+    /// A closed octahedron: the cheapest thing that looks like a bulb. Eight triangles.
+    pub(super) fn octahedron(&mut self, center: Vec3, radii: Vec3, paint: Paint) {
+        let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| axis * radii);
+        let poles = [x, -z, -x, z].map(|offset| self.vertex(center + offset, Vec3::ZERO));
+        let [top, bottom] = [y, -y].map(|offset| self.vertex(center + offset, Vec3::ZERO));
+        for i in 0..4 {
+            let (a, b) = (poles[i], poles[(i + 1) % 4]);
+            self.index([a, b, top], paint);
+            self.index([b, a, bottom], paint);
+        }
+    }
+
     /// A point light of this radiant intensity (RGB), named as the current node.
     pub(super) fn point_light(&mut self, at: Vec3, intensity: Vec3) {
         let position_ws = self.pose.map_or(at, |pose| pose.point(at));
@@ -301,12 +331,20 @@ impl Builder {
             let [a, b, c] = mesh.corners(i);
             f64::from(radiance * PI * 0.5 * (b - a).cross(c - a).length())
         });
-        triangles.sum::<f64>() + self.parts.punctual.iter().map(|(light, _)| f64::from(light.power)).sum::<f64>()
+        triangles.sum::<f64>()
+            + self
+                .parts
+                .punctual
+                .iter()
+                .map(|(light, _)| f64::from(light.power))
+                .sum::<f64>()
     }
 
     /// Adds a camera; the first one is the default.
     pub(super) fn camera(&mut self, name: &str, eye: Vec3, target: Vec3, fov_y: f32) {
-        self.parts.cameras.push(Camera::look_at(name, eye, target, Vec3::Y, fov_y));
+        self.parts
+            .cameras
+            .push(Camera::look_at(name, eye, target, Vec3::Y, fov_y));
     }
 
     /// The scene: everything in mesh 0, placed by the identity.

@@ -52,7 +52,11 @@ impl Room {
 
     /// The middle of the floor.
     pub(super) fn center(&self) -> Vec3 {
-        Vec3::new(0.5 * (self.low.x + self.high.x), self.low.y, 0.5 * (self.low.z + self.high.z))
+        Vec3::new(
+            0.5 * (self.low.x + self.high.x),
+            self.low.y,
+            0.5 * (self.low.z + self.high.z),
+        )
     }
 
     /// Length of a wall.
@@ -135,7 +139,11 @@ impl Plan {
         for level in 0..=self.storeys {
             b.begin(format!("slab {level}"), "slab");
             let y = level as f32 * STOREY_HEIGHT;
-            b.cuboid([x0, y - (STOREY_HEIGHT - ROOM_HEIGHT), z0], [x1, y - 0.02, z1], shell.ceiling);
+            b.cuboid(
+                [x0, y - (STOREY_HEIGHT - ROOM_HEIGHT), z0],
+                [x1, y - 0.02, z1],
+                shell.ceiling,
+            );
         }
         for storey in 0..self.storeys {
             for row in 0..self.rows() {
@@ -144,7 +152,11 @@ impl Plan {
                     let room = &self.rooms[index];
                     b.begin(format!("room {index} / floor"), "floor");
                     let (low, high) = (room.low - Vec3::splat(0.03), room.high + Vec3::splat(0.03));
-                    b.cuboid([low.x, room.low.y - 0.1, low.z], [high.x, room.low.y, high.z], room.floor);
+                    b.cuboid(
+                        [low.x, room.low.y - 0.1, low.z],
+                        [high.x, room.low.y, high.z],
+                        room.floor,
+                    );
                 }
             }
             b.begin(format!("storey {storey} / walls"), "walls");
@@ -199,17 +211,28 @@ fn wall(b: &mut Builder, shell: &Shell, length: f32, opening: Option<Opening>, s
     let piece = |b: &mut Builder, x0: f32, x1: f32| {
         b.cuboid_painted([x0, foot, -HALF_WALL], [x1, top, HALF_WALL], paints(shell.frame));
         let skirting = HALF_WALL + 0.012;
-        b.cuboid([x0 + 0.001, -0.02, -skirting], [x1 - 0.001, 0.09, skirting], shell.skirting);
+        b.cuboid(
+            [x0 + 0.001, -0.02, -skirting],
+            [x1 - 0.001, 0.09, skirting],
+            shell.skirting,
+        );
     };
     let Some(opening) = opening else {
         piece(b, 0.0, length);
         return;
     };
-    let (x0, x1) = (opening.center - 0.5 * opening.width, opening.center + 0.5 * opening.width);
+    let (x0, x1) = (
+        opening.center - 0.5 * opening.width,
+        opening.center + 0.5 * opening.width,
+    );
     piece(b, 0.0, x0);
     piece(b, x1, length);
     let thin = HALF_WALL - 0.004;
-    b.cuboid_painted([x0 - 0.02, opening.height, -thin], [x1 + 0.02, top - 0.001, thin], paints(shell.frame));
+    b.cuboid_painted(
+        [x0 - 0.02, opening.height, -thin],
+        [x1 + 0.02, top - 0.001, thin],
+        paints(shell.frame),
+    );
     doorway(b, shell, [x0, x1], opening.height);
 }
 
@@ -218,6 +241,10 @@ fn doorway(b: &mut Builder, shell: &Shell, [x0, x1]: [f32; 2], height: f32) {
     let out = HALF_WALL + 0.02;
     b.cuboid([x0 - 0.06, -0.03, -out], [x0 + 0.02, height, out], shell.frame);
     b.cuboid([x1 - 0.02, -0.03, -out], [x1 + 0.06, height, out], shell.frame);
-    b.cuboid([x0 - 0.07, height - 0.02, -out - 0.003], [x1 + 0.07, height + 0.06, out + 0.003], shell.frame);
+    b.cuboid(
+        [x0 - 0.07, height - 0.02, -out - 0.003],
+        [x1 + 0.07, height + 0.06, out + 0.003],
+        shell.frame,
+    );
     b.cuboid([x0 + 0.001, -0.05, -0.09], [x1 - 0.001, 0.012, 0.09], shell.frame);
 }

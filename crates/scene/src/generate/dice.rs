@@ -14,7 +14,9 @@ pub(super) struct Dice {
 impl Dice {
     /// The stream named by `keys`: (seed, what for, which one).
     pub(super) fn new(keys: &[u32]) -> Self {
-        let key = keys.iter().fold(0x9e37_79b9, |key, &k| mix(key ^ mix(k.wrapping_add(0x85eb_ca6b))));
+        let key = keys
+            .iter()
+            .fold(0x9e37_79b9, |key, &k| mix(key ^ mix(k.wrapping_add(0x85eb_ca6b))));
         Self { key, count: 0 }
     }
 

@@ -3,6 +3,7 @@
 use super::builder::{Builder, Pose};
 use super::building::{Room, SIDES, Side};
 use super::dice::Dice;
+use super::fixtures::Spots;
 use super::furniture::{self as piece, Palette};
 use glam::{Vec2, Vec3};
 
@@ -20,8 +21,14 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) const ORDINARY: [Self; 6] =
-        [Self::Living, Self::Dining, Self::Study, Self::Library, Self::Bedroom, Self::Gallery];
+    pub(super) const ORDINARY: [Self; 6] = [
+        Self::Living,
+        Self::Dining,
+        Self::Study,
+        Self::Library,
+        Self::Bedroom,
+        Self::Gallery,
+    ];
 }
 
 /// Places pieces in a room so that they neither meet nor stand in a doorway.
@@ -34,14 +41,25 @@ struct Furnisher<'a> {
     count: u32,
     /// Where the last piece was put.
     pose: Pose,
+    /// What a lamp may hang over.
+    table: Option<Pose>,
+    /// Where a lamp may stand.
+    floor: Option<Vec3>,
     /// Taken floor, (low, high) in world (x, z).
     taken: Vec<(Vec2, Vec2)>,
     /// Taken wall: side, from, to.
     hung: Vec<(Side, f32, f32)>,
 }
 
-/// Furnishes `room`.
-pub(super) fn furnish(b: &mut Builder, dice: &mut Dice, palette: &Palette, room: &Room, index: usize, kind: Kind) {
+/// Furnishes `room`; tells where lamps may go.
+pub(super) fn furnish<'a>(
+    b: &mut Builder,
+    dice: &mut Dice,
+    palette: &Palette,
+    room: &'a Room,
+    index: usize,
+    kind: Kind,
+) -> Spots<'a> {
     let mut taken = Vec::new();
     let mut hung = Vec::new();
     for side in SIDES {
@@ -59,6 +77,8 @@ pub(super) fn furnish(b: &mut Builder, dice: &mut Dice, palette: &Palette, room:
         index,
         count: 0,
         pose: Pose::IDENTITY,
+        table: None,
+        floor: None,
         taken,
         hung,
     };
@@ -71,6 +91,13 @@ pub(super) fn furnish(b: &mut Builder, dice: &mut Dice, palette: &Palette, room:
         Kind::Bedroom => f.bedroom(),
         Kind::Gallery => f.gallery(),
     }
+    Spots {
+        room,
+        index,
+        kind,
+        table: f.table,
+        floor: f.floor,
+    }
 }
 
 /// The rectangle on the floor that a piece of half width `half` and from `near` to `far` in front of its pose covers.
@@ -79,12 +106,15 @@ fn footprint(pose: &Pose, half: f32, near: f32, far: f32) -> (Vec2, Vec2) {
         let at = pose.point(Vec3::new(x, 0.0, z));
         Vec2::new(at.x, at.z)
     });
-    corners.iter().fold((corners[0], corners[0]), |(low, high), &c| (low.min(c), high.max(c)))
+    corners
+        .iter()
+        .fold((corners[0], corners[0]), |(low, high), &c| (low.min(c), high.max(c)))
 }
 
 impl Furnisher<'_> {
     fn begin(&mut self, what: &str) {
-        self.b.begin(format!("room {} / {what} {}", self.index, self.count), what);
+        self.b
+            .begin(format!("room {} / {what} {}", self.index, self.count), what);
         self.count += 1;
     }
 
@@ -94,7 +124,11 @@ impl Furnisher<'_> {
             && low.y >= room.low.z - 0.01
             && high.x <= room.high.x + 0.01
             && high.y <= room.high.z + 0.01;
-        inside && self.taken.iter().all(|&(l, h)| low.x >= h.x || high.x <= l.x || low.y >= h.y || high.y <= l.y)
+        inside
+            && self
+                .taken
+                .iter()
+                .all(|&(l, h)| low.x >= h.x || high.x <= l.x || low.y >= h.y || high.y <= l.y)
     }
 
     /// Puts a piece of this width and depth at a wall, if a place is found; `tall` keeps paintings away.
@@ -133,7 +167,11 @@ impl Furnisher<'_> {
             let length = self.room.length(side);
             let along = self.dice.range(0.5 * size[0] + 0.2, length - 0.5 * size[0] - 0.2);
             let (from, to) = (along - 0.5 * size[0] - 0.1, along + 0.5 * size[0] + 0.1);
-            if self.hung.iter().all(|&(s, low, high)| s != side || from >= high || to <= low) {
+            if self
+                .hung
+                .iter()
+                .all(|&(s, low, high)| s != side || from >= high || to <= low)
+            {
                 self.paint_at(side, along, size);
                 return;
             }
@@ -152,14 +190,28 @@ impl Furnisher<'_> {
         for _ in 0..8 {
             let margin = 0.42;
             let (x, z) = if corner {
-                (self.dice.pick(&[margin, size.x - margin]), self.dice.pick(&[margin, size.y - margin]))
+                (
+                    self.dice.pick(&[margin, size.x - margin]),
+                    self.dice.pick(&[margin, size.y - margin]),
+                )
             } else {
-                (self.dice.range(margin, size.x - margin), self.dice.range(margin, size.y - margin))
+                (
+                    self.dice.range(margin, size.x - margin),
+                    self.dice.range(margin, size.y - margin),
+                )
             };
             let at = self.room.low + Vec3::new(x, 0.0, z);
             let area = (Vec2::new(at.x - 0.3, at.z - 0.3), Vec2::new(at.x + 0.3, at.z + 0.3));
             if self.free(area) {
-                self.stand("plant", Pose { origin: at, ..Pose::IDENTITY }, area, None);
+                self.stand(
+                    "plant",
+                    Pose {
+                        origin: at,
+                        ..Pose::IDENTITY
+                    },
+                    area,
+                    None,
+                );
                 let height = self.dice.range(0.9, 1.6);
                 piece::plant(self.b, self.dice, self.palette, height, 12);
                 return;
@@ -167,9 +219,30 @@ impl Furnisher<'_> {
         }
     }
 
+    /// Keeps the floor of a corner free for a lamp.
+    fn keep_lamp_corner(&mut self) {
+        let size = self.room.size();
+        for _ in 0..8 {
+            let margin = 0.3;
+            let (x, z) = (
+                self.dice.pick(&[margin, size.x - margin]),
+                self.dice.pick(&[margin, size.y - margin]),
+            );
+            let at = self.room.low + Vec3::new(x, 0.0, z);
+            let area = (Vec2::new(at.x - 0.25, at.z - 0.25), Vec2::new(at.x + 0.25, at.z + 0.25));
+            if self.free(area) {
+                self.taken.push(area);
+                self.floor = Some(at);
+                return;
+            }
+        }
+    }
+
     fn shelf(&mut self, width: f32, fill: f32) {
         if self.at_wall("shelf", width, 0.32, true) {
-            let wood = self.dice.pick(&[self.palette.oak, self.palette.walnut, self.palette.white]);
+            let wood = self
+                .dice
+                .pick(&[self.palette.oak, self.palette.walnut, self.palette.white]);
             let height = self.dice.pick(&[1.2, 2.0]);
             piece::shelf(self.b, self.dice, self.palette, [width, height], wood, fill);
         }
@@ -187,19 +260,31 @@ impl Furnisher<'_> {
         let center = self.room.center();
         let half = (0.27 * self.room.size()).min(Vec2::new(1.5, 1.1));
         let field = self.dice.pick(&self.palette.fabric);
-        let border = self.dice.pick(&[self.palette.linen, self.palette.fabric[4], self.palette.fabric[2]]);
+        let border = self
+            .dice
+            .pick(&[self.palette.linen, self.palette.fabric[4], self.palette.fabric[2]]);
         self.begin("rug");
-        self.b.place(Pose { origin: center, ..Pose::IDENTITY });
+        self.b.place(Pose {
+            origin: center,
+            ..Pose::IDENTITY
+        });
         piece::rug(self.b, [half.x, half.y], field, border);
-        self.taken.push((Vec2::new(center.x, center.z) - half, Vec2::new(center.x, center.z) + half));
+        self.taken.push((
+            Vec2::new(center.x, center.z) - half,
+            Vec2::new(center.x, center.z) + half,
+        ));
         center
     }
 
     fn living(&mut self) {
+        self.keep_lamp_corner();
         let center = self.middle();
         let fabric = self.dice.pick(&self.palette.fabric);
         self.begin("coffee table");
-        self.b.place(Pose { origin: center + Vec3::Y * 0.011, ..Pose::IDENTITY });
+        self.b.place(Pose {
+            origin: center + Vec3::Y * 0.011,
+            ..Pose::IDENTITY
+        });
         piece::round_table(self.b, 0.45, 0.42, self.palette.oak, self.palette.dark);
         piece::stack(self.b, self.dice, self.palette, Vec3::new(0.1, 0.42, 0.05));
         if self.at_wall("sofa", 2.1, 0.95, false) {
@@ -217,9 +302,14 @@ impl Furnisher<'_> {
 
     fn dining(&mut self) {
         let center = self.middle();
-        let turns = if self.room.size().y > self.room.size().x { 0.25 } else { 0.0 };
+        let turns = if self.room.size().y > self.room.size().x {
+            0.25
+        } else {
+            0.0
+        };
         self.begin("dining table");
         piece::dining_group(self.b, self.dice, self.palette, center + Vec3::Y * 0.011, turns, 2);
+        self.table = Some(Pose::new(center, turns));
         self.sideboard();
         self.plant(true);
         self.plant(true);
@@ -233,7 +323,10 @@ impl Furnisher<'_> {
             // Someone sits at it: the chair looks at the wall.
             let seat = self.dice.pick(&self.palette.fabric);
             let at = self.pose.point(Vec3::new(0.0, 0.0, 0.95));
-            self.b.place(Pose { origin: at, x_axis: -self.pose.x_axis });
+            self.b.place(Pose {
+                origin: at,
+                x_axis: -self.pose.x_axis,
+            });
             piece::chair(self.b, self.palette.dark, seat);
         }
         self.middle();
@@ -244,6 +337,7 @@ impl Furnisher<'_> {
     }
 
     fn library(&mut self) {
+        self.keep_lamp_corner();
         for _ in 0..3 {
             self.shelf(1.8, 0.9);
         }
@@ -256,6 +350,7 @@ impl Furnisher<'_> {
     }
 
     fn bedroom(&mut self) {
+        self.keep_lamp_corner();
         if self.at_wall("bed", 1.8, 2.2, false) {
             piece::bed(self.b, self.dice, self.palette);
         }
@@ -269,10 +364,23 @@ impl Furnisher<'_> {
     fn gallery(&mut self) {
         for _ in 0..3 {
             let size = self.room.size();
-            let at = self.room.low + Vec3::new(self.dice.range(0.6, size.x - 0.6), 0.0, self.dice.range(0.6, size.y - 0.6));
+            let at = self.room.low
+                + Vec3::new(
+                    self.dice.range(0.6, size.x - 0.6),
+                    0.0,
+                    self.dice.range(0.6, size.y - 0.6),
+                );
             let area = (Vec2::new(at.x - 0.4, at.z - 0.4), Vec2::new(at.x + 0.4, at.z + 0.4));
             if self.free(area) {
-                self.stand("pedestal", Pose { origin: at, ..Pose::IDENTITY }, area, None);
+                self.stand(
+                    "pedestal",
+                    Pose {
+                        origin: at,
+                        ..Pose::IDENTITY
+                    },
+                    area,
+                    None,
+                );
                 piece::pedestal(self.b, self.dice, self.palette);
             }
         }
@@ -287,10 +395,16 @@ impl Furnisher<'_> {
         let (low, high) = (self.room.low, self.room.high);
         let at = |x: f32, z: f32| Vec3::new(low.x + x, low.y, low.z + z);
         self.begin("rug");
-        self.b.place(Pose { origin: at(2.5, 3.1), ..Pose::IDENTITY });
+        self.b.place(Pose {
+            origin: at(2.5, 3.1),
+            ..Pose::IDENTITY
+        });
         piece::rug(self.b, [1.6, 1.25], p.linen, p.fabric[4]);
         self.begin("coffee table");
-        self.b.place(Pose { origin: at(2.45, 3.1) + Vec3::Y * 0.011, ..Pose::IDENTITY });
+        self.b.place(Pose {
+            origin: at(2.45, 3.1) + Vec3::Y * 0.011,
+            ..Pose::IDENTITY
+        });
         piece::round_table(self.b, 0.5, 0.42, p.oak, p.dark);
         piece::stack(self.b, self.dice, p, Vec3::new(0.14, 0.42, 0.1));
         piece::vase(self.b, Vec3::new(-0.15, 0.42, -0.12), 0.26, p.clay);
@@ -298,8 +412,10 @@ impl Furnisher<'_> {
         self.b.place(self.room.at_wall(Side::NegX, 3.2));
         piece::sofa(self.b, self.dice, p, 2.3, p.fabric[0]);
         self.begin("armchair");
-        self.b.place(Pose::new(at(4.35, 2.15), 0.62));
+        self.b.place(Pose::new(at(2.2, 0.75), 0.03));
         piece::sofa(self.b, self.dice, p, 1.0, p.fabric[1]);
+        self.table = Some(Pose::new(at(2.45, 3.1), 0.0));
+        self.floor = Some(at(0.3, 1.9));
         self.begin("shelf");
         self.b.place(self.room.at_wall(Side::NegZ, 1.55));
         piece::shelf(self.b, self.dice, p, [1.9, 2.1], p.walnut, 0.75);
@@ -307,7 +423,10 @@ impl Furnisher<'_> {
         self.b.place(self.room.at_wall(Side::PosX, 2.0));
         piece::sideboard(self.b, self.dice, p, 1.8, p.oak);
         self.begin("plant");
-        self.b.place(Pose { origin: at(high.x - low.x - 0.75, 0.55), ..Pose::IDENTITY });
+        self.b.place(Pose {
+            origin: at(high.x - low.x - 0.75, 0.55),
+            ..Pose::IDENTITY
+        });
         piece::plant(self.b, self.dice, p, 1.55, 22);
         self.paint_at(Side::NegX, 3.2, [1.4, 0.85]);
         self.paint_at(Side::PosX, 2.0, [0.8, 0.8]);

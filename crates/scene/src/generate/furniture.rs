@@ -81,7 +81,13 @@ pub(super) fn table(b: &mut Builder, size: [f32; 3], top: Paint, leg: Paint) {
 pub(super) fn round_table(b: &mut Builder, radius: f32, height: f32, top: Paint, leg: Paint) {
     b.cylinder(Vec3::new(0.0, height - 0.035, 0.0), radius, 0.035, 32, top);
     b.cylinder(Vec3::new(0.0, 0.01, 0.0), 0.045, height - 0.03, 12, leg);
-    b.frustum(Vec3::new(0.0, -SINK, 0.0), [0.55 * radius, 0.5 * radius], 0.035, 24, leg);
+    b.frustum(
+        Vec3::new(0.0, -SINK, 0.0),
+        [0.55 * radius, 0.5 * radius],
+        0.035,
+        24,
+        leg,
+    );
 }
 
 /// A chair; who sits on it looks along +z.
@@ -137,7 +143,11 @@ pub(super) fn books(b: &mut Builder, dice: &mut Dice, p: &Palette, x: [f32; 2], 
         }
         let height = tallest * dice.range(0.66, 1.0);
         let front = z[1] - dice.range(0.0, 0.05);
-        b.cuboid([left + 0.001, y - SINK, z[0]], [left + thick - 0.001, y + height, front], dice.pick(&p.spine));
+        b.cuboid(
+            [left + 0.001, y - SINK, z[0]],
+            [left + thick - 0.001, y + height, front],
+            dice.pick(&p.spine),
+        );
         left += thick;
     }
 }
@@ -164,7 +174,12 @@ pub(super) fn shelf(b: &mut Builder, dice: &mut Dice, p: &Palette, size: [f32; 2
         }
         if end < h - 0.25 {
             let at = Vec3::new(h - 0.13, y, 0.15);
-            vase(b, at, 0.7 * step.min(0.3), dice.pick(&[p.clay, p.white, p.brass, p.fabric[0]]));
+            vase(
+                b,
+                at,
+                0.7 * step.min(0.3),
+                dice.pick(&[p.clay, p.white, p.brass, p.fabric[0]]),
+            );
         }
     }
 }
@@ -173,8 +188,20 @@ pub(super) fn shelf(b: &mut Builder, dice: &mut Dice, p: &Palette, size: [f32; 2
 pub(super) fn vase(b: &mut Builder, at: Vec3, height: f32, paint: Paint) {
     let r = 0.28 * height;
     b.frustum(at - Vec3::Y * SINK, [0.6 * r, r], 0.45 * height, 16, paint);
-    b.frustum(at + Vec3::Y * (0.43 * height), [0.97 * r, 0.4 * r], 0.4 * height, 16, paint);
-    b.frustum(at + Vec3::Y * (0.81 * height), [0.41 * r, 0.55 * r], 0.19 * height, 16, paint);
+    b.frustum(
+        at + Vec3::Y * (0.43 * height),
+        [0.97 * r, 0.4 * r],
+        0.4 * height,
+        16,
+        paint,
+    );
+    b.frustum(
+        at + Vec3::Y * (0.81 * height),
+        [0.41 * r, 0.55 * r],
+        0.19 * height,
+        16,
+        paint,
+    );
 }
 
 /// A low cupboard against the wall, with things on it.
@@ -186,15 +213,29 @@ pub(super) fn sideboard(b: &mut Builder, dice: &mut Dice, p: &Palette, width: f3
         let x = -h + (i as f32) * width / doors;
         let panel = if wood == p.walnut { p.oak } else { p.white };
         b.cuboid([x + 0.01, 0.16, 0.40], [x + width / doors - 0.01, 0.72, 0.452], panel);
-        b.cuboid([x + width / doors - 0.05, 0.42, 0.44], [x + width / doors - 0.035, 0.52, 0.47], p.brass);
+        b.cuboid(
+            [x + width / doors - 0.05, 0.42, 0.44],
+            [x + width / doors - 0.035, 0.52, 0.47],
+            p.brass,
+        );
     }
     for x in [-h + 0.08, h - 0.08] {
         for z in [0.08, 0.38] {
             b.cylinder(Vec3::new(x, -SINK, z), 0.018, 0.16, 8, p.dark);
         }
     }
-    vase(b, Vec3::new(-h + 0.25, 0.74, 0.22), dice.range(0.26, 0.42), dice.pick(&[p.clay, p.fabric[0], p.linen]));
-    b.ball(Vec3::new(h - 0.32, 0.74 + 0.095, 0.23), 0.1, 16, dice.pick(&[p.brass, p.white, p.fabric[1]]));
+    vase(
+        b,
+        Vec3::new(-h + 0.25, 0.74, 0.22),
+        dice.range(0.26, 0.42),
+        dice.pick(&[p.clay, p.fabric[0], p.linen]),
+    );
+    b.ball(
+        Vec3::new(h - 0.32, 0.74 + 0.095, 0.23),
+        0.1,
+        16,
+        dice.pick(&[p.brass, p.white, p.fabric[1]]),
+    );
     stack(b, dice, p, Vec3::new(0.05, 0.74, 0.22));
 }
 
@@ -235,7 +276,12 @@ pub(super) fn desk(b: &mut Builder, dice: &mut Dice, p: &Palette) {
     b.cuboid([-0.12, 0.74 - SINK, 0.12], [0.12, 0.755, 0.30], p.dark);
     b.cuboid([-0.22, 0.74 - SINK, 0.42], [0.20, 0.757, 0.56], p.white);
     stack(b, dice, p, Vec3::new(-0.55, 0.74, 0.3));
-    vase(b, Vec3::new(0.58, 0.74, 0.25), 0.22, dice.pick(&[p.clay, p.fabric[5], p.brass]));
+    vase(
+        b,
+        Vec3::new(0.58, 0.74, 0.25),
+        0.22,
+        dice.pick(&[p.clay, p.fabric[5], p.brass]),
+    );
 }
 
 /// A pot with long bent leaves.
@@ -273,15 +319,27 @@ fn leaf(b: &mut Builder, from: Vec3, middle: Vec3, tip: Vec3, half_width: f32, p
 /// A rug with a border, centred.
 pub(super) fn rug(b: &mut Builder, half: [f32; 2], field: Paint, border: Paint) {
     b.cuboid([-half[0], -SINK, -half[1]], [half[0], 0.008, half[1]], border);
-    b.cuboid([-half[0] + 0.12, 0.002, -half[1] + 0.12], [half[0] - 0.12, 0.011, half[1] - 0.12], field);
+    b.cuboid(
+        [-half[0] + 0.12, 0.002, -half[1] + 0.12],
+        [half[0] - 0.12, 0.011, half[1] - 0.12],
+        field,
+    );
 }
 
 /// An abstract painting on the wall; its centre hangs at height 1.55 m.
 pub(super) fn painting(b: &mut Builder, dice: &mut Dice, p: &Palette, size: [f32; 2]) {
     let [w, h] = [0.5 * size[0], 0.5 * size[1]];
     let y = 1.55;
-    b.cuboid([-w, y - h, -SINK], [w, y + h, 0.03], dice.pick(&[p.dark, p.oak, p.brass]));
-    b.cuboid([-w + 0.03, y - h + 0.03, 0.01], [w - 0.03, y + h - 0.03, 0.034], p.linen);
+    b.cuboid(
+        [-w, y - h, -SINK],
+        [w, y + h, 0.03],
+        dice.pick(&[p.dark, p.oak, p.brass]),
+    );
+    b.cuboid(
+        [-w + 0.03, y - h + 0.03, 0.01],
+        [w - 0.03, y + h - 0.03, 0.034],
+        p.linen,
+    );
     for i in 0..4 {
         let (u, v) = (dice.range(-0.6, 0.3) * w, dice.range(-0.6, 0.3) * h);
         let (s, t) = (dice.range(0.25, 0.55) * w, dice.range(0.25, 0.55) * h);
@@ -306,7 +364,12 @@ pub(super) fn dining_group(b: &mut Builder, dice: &mut Dice, p: &Palette, center
     let length = 0.35 + 0.65 * seats as f32;
     b.place(Pose::new(center, turns));
     table(b, [length, 0.75, 0.92], p.oak, p.oak);
-    vase(b, Vec3::new(0.1, 0.75, 0.0), 0.3, dice.pick(&[p.clay, p.white, p.fabric[0]]));
+    vase(
+        b,
+        Vec3::new(0.1, 0.75, 0.0),
+        0.3,
+        dice.pick(&[p.clay, p.white, p.fabric[0]]),
+    );
     for i in 0..seats {
         for z in [-0.22, 0.22] {
             let x = (i as f32 - 0.5 * (seats as f32 - 1.0)) * 0.65;

@@ -22,13 +22,15 @@ pub(super) enum Source {
     Points,
 }
 
-/// Light from the underside of a box: position of its lower face, half sizes and height of the box.
+/// A box that shines from its underside: middle of its lower face, half sizes and height of the box.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lamp {
     pub(super) bottom_center: Vec3,
     pub(super) half: [f32; 2],
     pub(super) height: f32,
     pub(super) housing: Paint,
+    /// Shines up from its upper face instead of down from the lower one.
+    pub(super) up: bool,
 }
 
 /// Rows of at most equal numbers: how many rectangles in each row, for `count` of them on a face of the given shape.
@@ -51,27 +53,36 @@ fn cells(count: usize, half: [f32; 2]) -> Vec<[f32; 4]> {
 }
 
 impl Lamp {
-    /// Builds it with `lights` lights that together shine the flux `flux` (RGB, W) downwards.
+    /// Builds it with `lights` lights that together shine the flux `flux` (RGB, W) away from it.
     pub(super) fn build(&self, b: &mut Builder, source: Source, lights: usize, flux: Vec3, emitter: &str) {
         let c = self.bottom_center;
         let [hx, hz] = self.half;
-        b.cuboid([c.x - hx, c.y, c.z - hz], [c.x + hx, c.y + self.height, c.z + hz], self.housing);
+        b.cuboid(
+            [c.x - hx, c.y, c.z - hz],
+            [c.x + hx, c.y + self.height, c.z + hz],
+            self.housing,
+        );
         if lights == 0 {
             return;
         }
         match source {
             Source::Panels => {
                 let inner = [hx * 0.94, hz * 0.94];
-                let below = c - Vec3::Y * PROUD;
+                let face = if self.up {
+                    c + Vec3::Y * (self.height + PROUD)
+                } else {
+                    c - Vec3::Y * PROUD
+                };
                 let radiance = flux / (PI * panel_area(lights, inner));
                 let paint = b.emitter(emitter, round_radiance(radiance));
-                panel(b, below, inner, lights, paint);
+                panel(b, face, inner, self.up, lights, paint);
             }
             Source::Points => {
-                // Half of what a point shines goes up, into the housing.
+                // Half of what a point shines goes into the housing.
                 let intensity = round_radiance(flux / (2.0 * PI * lights as f32));
+                let rise = if self.up { self.height + POINT_DROP } else { -POINT_DROP };
                 for [x, z, ..] in cells(lights, self.half) {
-                    b.point_light(c + Vec3::new(x, -POINT_DROP, z), intensity);
+                    b.point_light(c + Vec3::new(x, rise, z), intensity);
                 }
             }
         }
@@ -91,11 +102,13 @@ fn panel_area(lights: usize, half: [f32; 2]) -> f32 {
     }
 }
 
-/// Exactly `lights` emissive triangles that look down, on a rectangle around `center`.
-fn panel(b: &mut Builder, center: Vec3, half: [f32; 2], lights: usize, paint: Paint) {
+/// Exactly `lights` emissive triangles that look up or down, on a rectangle around `center`.
+fn panel(b: &mut Builder, center: Vec3, half: [f32; 2], up: bool, lights: usize, paint: Paint) {
+    // Mirrored, the corners below run the other way round.
+    let side = if up { -1.0 } else { 1.0 };
     if lights == 1 {
         let [hx, hz] = half;
-        let corner = |x: f32, z: f32| center + Vec3::new(x, 0.0, z);
+        let corner = |x: f32, z: f32| center + Vec3::new(side * x, 0.0, z);
         b.triangle([corner(-hx, -hz), corner(hx, -hz), corner(0.0, hz)], paint);
         return;
     }
@@ -103,7 +116,7 @@ fn panel(b: &mut Builder, center: Vec3, half: [f32; 2], lights: usize, paint: Pa
     let fill = fill(count);
     for (i, [x, z, hx, hz]) in cells(count, half).into_iter().enumerate() {
         let (hx, hz) = (hx * fill, hz * fill);
-        let at = |dx: f32, dz: f32| center + Vec3::new(x + dx, 0.0, z + dz);
+        let at = |dx: f32, dz: f32| center + Vec3::new(side * (x + dx), 0.0, z + dz);
         let corners = [at(-hx, -hz), at(hx, -hz), at(hx, hz), at(-hx, hz)];
         if i == 0 && lights % 2 == 1 {
             let [p, q, r, s] = corners;
@@ -116,7 +129,10 @@ fn panel(b: &mut Builder, center: Vec3, half: [f32; 2], lights: usize, paint: Pa
 
 /// Rounded to five significant bits, so that a building has tens of lamp materials, not thousands.
 fn round_radiance(radiance: Vec3) -> Vec3 {
-    radiance.to_array().map(|x| f32::from_bits(x.to_bits().wrapping_add(1 << 18) & !((1 << 19) - 1))).into()
+    radiance
+        .to_array()
+        .map(|x| f32::from_bits(x.to_bits().wrapping_add(1 << 18) & !((1 << 19) - 1)))
+        .into()
 }
 
 /// `lights` shared between `lamps` as evenly as whole numbers go: how many the lamp `i` gets.
@@ -140,6 +156,7 @@ mod tests {
                     half: [0.6, 0.2],
                     height: 0.1,
                     housing,
+                    up: lights % 2 == 0,
                 };
                 lamp.build(&mut b, source, lights, Vec3::splat(10.0), "glow");
                 assert_eq!(b.light_count(), lights);

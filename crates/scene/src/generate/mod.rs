@@ -6,10 +6,13 @@
 mod builder;
 mod building;
 mod dice;
+mod fixtures;
 mod furnish;
 mod furniture;
 mod lamps;
 mod one_light;
+mod plaza;
+mod plaza_town;
 mod rooms;
 
 use crate::{SceneError, SceneParts};
@@ -38,6 +41,12 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 2048,
         make: |lights, seed| rooms::rooms("points", lights, seed, Source::Points),
+    },
+    Family {
+        name: "plaza",
+        lights: MANY,
+        default: 4096,
+        make: plaza::plaza,
     },
     Family {
         name: "sun-outside",
@@ -83,14 +92,20 @@ pub fn demo(what: &str) -> Result<SceneParts, SceneError> {
     };
     if !family.lights.contains(&lights) {
         let (least, most) = (family.lights.start(), family.lights.end());
-        return Err(error(format!("{lights} lights asked for, {least} to {most} can be made")));
+        return Err(error(format!(
+            "{lights} lights asked for, {least} to {most} can be made"
+        )));
     }
     let seed = match fields.next() {
         None => 0,
-        Some(field) => field.parse().map_err(|_| error(format!("'{field}' is no seed (0 to 4294967295)")))?,
+        Some(field) => field
+            .parse()
+            .map_err(|_| error(format!("'{field}' is no seed (0 to 4294967295)")))?,
     };
     if let Some(rest) = fields.next() {
-        return Err(error(format!("'{rest}' is one field too many, NAME[:LIGHTS[:SEED]] is read")));
+        return Err(error(format!(
+            "'{rest}' is one field too many, NAME[:LIGHTS[:SEED]] is read"
+        )));
     }
     Ok((family.make)(lights, seed))
 }

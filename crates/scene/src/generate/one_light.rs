@@ -3,8 +3,8 @@
 use super::builder::{Builder, Pose};
 use super::building::{Plan, Room, Shell};
 use super::dice::Dice;
+use super::fixtures::NEUTRAL;
 use super::furniture::{self as piece, Palette};
-use super::rooms::NEUTRAL;
 use crate::{SceneParts, luminance};
 use glam::Vec3;
 use std::f32::consts::PI;
@@ -74,12 +74,20 @@ pub(super) fn one_light(seed: u32) -> SceneParts {
     b.polygon(&bottom, p.white);
     for i in 0..3 {
         let j = (i + 1) % 3;
-        b.polygon(&[corner(0.75, i, 0.11), corner(0.75, j, 0.11), bottom[j], bottom[i]], p.white);
+        b.polygon(
+            &[corner(0.75, i, 0.11), corner(0.75, j, 0.11), bottom[j], bottom[i]],
+            p.white,
+        );
     }
     let flux = 3.2 * room.size().element_product() / 0.55;
     let area = 0.75 * 3f32.sqrt() * 0.7 * 0.7;
     let paint = b.emitter("lamp", NEUTRAL * (flux / (PI * area * luminance(NEUTRAL))));
     b.triangle([0, 1, 2].map(|i| corner(0.7, i, -0.002)), paint);
-    b.camera("door", Vec3::new(high.x - 0.5, 1.5, high.z - 0.3), Vec3::new(2.2, 0.95, 1.6), 0.95);
+    b.camera(
+        "door",
+        Vec3::new(high.x - 0.5, 1.5, high.z - 0.3),
+        Vec3::new(2.2, 0.95, 1.6),
+        0.95,
+    );
     b.finish()
 }

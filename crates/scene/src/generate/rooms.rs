@@ -1,11 +1,12 @@
 //! A building of many furnished rooms: `rooms`, `points` and `sun-outside`.
 
-use super::building::{Opening, Plan, Room, SIDES, STOREY_HEIGHT, Shell, Side};
 use super::builder::Builder;
+use super::building::{Opening, Plan, Room, STOREY_HEIGHT, Shell, Side};
 use super::dice::Dice;
-use super::furniture::Palette;
+use super::fixtures::light;
 use super::furnish::{Kind, furnish};
-use super::lamps::{Lamp, Source, share};
+use super::furniture::Palette;
+use super::lamps::{Source, share};
 use crate::SceneParts;
 use glam::Vec3;
 
@@ -39,13 +40,20 @@ pub(super) fn sun_outside(lights: usize, seed: u32) -> SceneParts {
     let color = Vec3::new(1.0, 0.93, 0.8);
     let radiance = power as f32 / (std::f32::consts::PI * 2.0 * half * half * crate::luminance(color));
     let paint = b.emitter("sun", color * radiance);
-    b.triangle([center - right * half - up * half, center + up * half, center + right * half - up * half], paint);
+    b.triangle(
+        [
+            center - right * half - up * half,
+            center + up * half,
+            center + right * half - up * half,
+        ],
+        paint,
+    );
     b.finish()
 }
 
-/// How many storeys, rows and columns: about one room for every sqrt(lights) lights, at least 4, at most about 540.
+/// How many storeys, rows and columns: about one room for every sqrt(lights) lights, at least 4, at most about 400.
 fn grid(lights: usize) -> (usize, usize, usize) {
-    let rooms = (lights as f32).sqrt().clamp(4.0, 540.0);
+    let rooms = (lights as f32).sqrt().clamp(4.0, 400.0);
     let storeys = (rooms / 32.0).ceil().min(8.0);
     let columns = (rooms / storeys).sqrt().round().max(2.0);
     let rows = (rooms / storeys / columns).round().max(2.0);
@@ -71,14 +79,14 @@ fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Vec3 {
             Some(2) if index + 2 * plan.columns() == hero => Kind::Gallery,
             _ => dice.pick(&Kind::ORDINARY),
         };
-        furnish(b, &mut dice, &palette, room, index, kind);
+        let spots = furnish(b, &mut dice, &palette, room, index, kind);
         let lights = share(lights, plan.rooms.len(), index);
-        light(b, &mut dice, &palette, room, index, kind, source, lights);
+        light(b, &mut dice, &palette, &spots, lights, source);
     }
     b.place_in_world();
     let room = &plan.rooms[hero];
     let eye = Vec3::new(room.high.x - 1.15, room.low.y + 1.52, room.high.z - 0.35);
-    let target = Vec3::new(room.low.x + 2.9, room.low.y + 1.16, room.low.z);
+    let target = Vec3::new(room.low.x + 2.75, room.low.y + 1.12, room.low.z);
     b.camera("hall", eye, target, 0.96);
     Vec3::new(
         plan.xs[plan.columns()],
@@ -207,114 +215,5 @@ fn share_openings(plan: &mut Plan) {
         if column > 0 {
             plan.rooms[index - 1].openings[Side::PosX as usize] = left;
         }
-    }
-}
-
-/// Lamp light, linear RGB of luminance about 1: warm, neutral, cool and a few tinted ones.
-const WARM: Vec3 = Vec3::new(1.45, 0.93, 0.42);
-pub(super) const NEUTRAL: Vec3 = Vec3::new(1.18, 0.98, 0.74);
-const COOL: Vec3 = Vec3::new(0.80, 1.02, 1.36);
-const TINTED: [Vec3; 4] = [
-    Vec3::new(1.9, 0.78, 0.25),
-    Vec3::new(0.35, 1.15, 1.35),
-    Vec3::new(1.75, 0.66, 1.1),
-    Vec3::new(0.55, 1.2, 0.75),
-];
-
-/// Hangs the lamps of one room: exactly `lights` lights.
-#[expect(clippy::too_many_arguments, reason = "called once; a struct would only rename them")]
-fn light(
-    b: &mut Builder,
-    dice: &mut Dice,
-    palette: &Palette,
-    room: &Room,
-    index: usize,
-    kind: Kind,
-    source: Source,
-    lights: usize,
-) {
-    b.place_in_world();
-    let size = room.size();
-    let (color, irradiance) = match kind {
-        Kind::Hero => (NEUTRAL, 3.2),
-        Kind::Dining => (WARM, 4.2),
-        Kind::Gallery => (COOL, 6.5),
-        _ if dice.chance(0.14) => (dice.pick(&TINTED), dice.range(1.5, 3.5)),
-        _ => (dice.pick(&[WARM, WARM, NEUTRAL, COOL]), dice.range(1.2, 6.0)),
-    };
-    // Flux that gives about this mean irradiance on the floor; the rest falls on walls and furniture.
-    let flux = color * (irradiance * size.x * size.y / 0.55);
-    let hanging = if matches!(kind, Kind::Dining | Kind::Hero | Kind::Study) && lights >= 6 { lights.div_ceil(6) } else { 0 };
-    let sconces = if lights >= 20 { (lights / 10).min(60) / 2 * 2 } else { 0 };
-    let ceiling = lights - hanging - sconces;
-
-    let place = |what: &str, i: usize| format!("room {index} / {what} {i}");
-    // Ceiling panels on a grid that follows the shape of the room.
-    let lamps = ((ceiling as f32 / 2.0).sqrt() as usize).clamp(1, 12).min(ceiling);
-    let rows = ((lamps as f32 * size.y / size.x).sqrt().round() as usize).clamp(1, lamps);
-    let long = dice.chance(0.4);
-    let mut lamp = 0;
-    for row in 0..rows {
-        let columns = share(lamps, rows, row);
-        for column in 0..columns {
-            let x = room.low.x + size.x * (column as f32 + 0.5) / columns as f32;
-            let z = room.low.z + size.y * (row as f32 + 0.5) / rows as f32;
-            let half = if long { [0.55, 0.09] } else { [0.3, 0.3] };
-            b.begin(place("ceiling lamp", lamp), "lamp panel");
-            let fixture = Lamp {
-                bottom_center: Vec3::new(x, room.high.y - 0.055, z),
-                half,
-                height: 0.06,
-                housing: palette.white,
-            };
-            let mine = share(ceiling, lamps, lamp);
-            let part = 0.72 * mine as f32 / ceiling as f32 + if hanging + sconces == 0 { 0.28 / lamps as f32 } else { 0.0 };
-            fixture.build(b, source, mine, flux * part, "ceiling light");
-            lamp += 1;
-        }
-    }
-    if hanging > 0 {
-        let pendants = if hanging < 6 { 1 } else { 3 };
-        let center = room.center();
-        for i in 0..pendants {
-            let offset = (i as f32 - 0.5 * (pendants as f32 - 1.0)) * 0.6;
-            let at = center + Vec3::new(offset, 1.72, 0.0);
-            b.begin(place("pendant lamp", i), "pendant");
-            b.bar(at + Vec3::Y * 0.1, Vec3::new(at.x, room.high.y + 0.02, at.z), 0.012, palette.dark);
-            let fixture = Lamp {
-                bottom_center: at,
-                half: [0.16, 0.16],
-                height: 0.12,
-                housing: dice.pick(&[palette.brass, palette.dark]),
-            };
-            fixture.build(b, source, share(hanging, pendants, i), WARM * (flux.element_sum() / 3.0 * 0.1), "pendant light");
-        }
-    }
-    wall_lights(b, palette, room, index, source, sconces, flux * 0.12);
-}
-
-/// Small lamps on the walls that shine down them, two for each wall that has room beside its doorway.
-fn wall_lights(b: &mut Builder, palette: &Palette, room: &Room, index: usize, source: Source, lights: usize, flux: Vec3) {
-    let lamps = lights.min(8) / 2;
-    for i in 0..lamps {
-        let side = SIDES[i % 4];
-        let length = room.length(side);
-        let along = match room.opening(side) {
-            Some(door) if door.center > 0.5 * length => 0.5 * (door.center - 0.5 * door.width),
-            Some(door) => 0.5 * (length + door.center + 0.5 * door.width),
-            None => 0.5 * length,
-        };
-        let pose = room.at_wall(side, along);
-        b.begin(format!("room {index} / wall lamp {i}"), "wall lamp");
-        b.place(pose);
-        b.cuboid([-0.03, 2.16, -0.01], [0.03, 2.26, 0.06], palette.brass);
-        let fixture = Lamp {
-            bottom_center: Vec3::new(0.0, 2.13, 0.12),
-            half: [0.1, 0.07],
-            height: 0.16,
-            housing: palette.brass,
-        };
-        fixture.build(b, source, share(lights, lamps, i), flux / lamps as f32, "wall light");
-        b.place_in_world();
     }
 }
