@@ -1,6 +1,9 @@
 //! From the name of a sampler to code made for it.
 
-use crate::{LightSampler, PowerSampler, SamplerKind, Settings, TableSampler, TreeSampler, UniformSampler};
+use crate::{
+    LightSampler, OctreeSampler, PowerSampler, SamplerKind, Settings, TableSampler, TreeSampler, TreeVisibleSampler,
+    UniformSampler,
+};
 use scene::Scene;
 
 /// What is to be done with a sampler whatever its type: one copy of [`Visitor::visit`] is compiled per sampler, so that
@@ -23,7 +26,9 @@ pub fn build<V: Visitor>(scene: &Scene, settings: &Settings, kind: SamplerKind, 
     match kind {
         SamplerKind::Uniform => visitor.visit(UniformSampler::new(lights)),
         SamplerKind::Power => visitor.visit(PowerSampler::new(lights, settings)),
-        SamplerKind::Tree | SamplerKind::TreeVisible | SamplerKind::Octree => visitor.visit(TreeSampler::new(lights)),
+        SamplerKind::Octree => visitor.visit(OctreeSampler::new(scene, settings)),
+        SamplerKind::Tree => visitor.visit(TreeSampler::new(lights)),
+        SamplerKind::TreeVisible => visitor.visit(TreeVisibleSampler::new(lights, settings)),
         SamplerKind::Table => visitor.visit(TableSampler::new(lights, settings)),
     }
 }

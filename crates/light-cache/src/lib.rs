@@ -9,6 +9,7 @@
 //! logs are merged in the order of the image's tiles.
 
 mod dispatch;
+mod octree;
 mod power;
 mod records;
 pub mod settings;
@@ -16,6 +17,7 @@ mod table;
 #[cfg(test)]
 mod testing;
 mod tree;
+mod tree_visible;
 mod uniform;
 
 use glam::Vec3;
@@ -23,11 +25,13 @@ use scene::Scene;
 use std::fmt::Debug;
 
 pub use dispatch::{Visitor, build};
+pub use octree::OctreeSampler;
 pub use power::PowerSampler;
 pub use records::Recording;
 pub use settings::{SamplerKind, Settings};
 pub use table::TableSampler;
 pub use tree::TreeSampler;
+pub use tree_visible::TreeVisibleSampler;
 pub use uniform::UniformSampler;
 
 /// What a sampler may know about the point that wants light.

@@ -62,3 +62,30 @@ impl LightSampler for PowerSampler {
         records::of_sampler(self, scene, &[])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, points, scene_of};
+
+    #[test]
+    fn keeps_the_promises_of_a_sampler() {
+        for count in [1, 2, 300] {
+            let scene = scene_of(mixed_lights(count, 3));
+            let sampler = PowerSampler::new(&scene.lights, &Settings::default());
+            check(&sampler, &scene, &points(4, 5));
+            check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+        }
+    }
+
+    #[test]
+    fn black_and_missing_lights_do_no_harm() {
+        let mut lights = mixed_lights(20, 3);
+        for light in &mut lights {
+            light.power = 0.0;
+        }
+        let sampler = PowerSampler::new(&lights, &Settings::default());
+        assert!((sampler.pmf(&(), 3) - 0.05).abs() < 1e-6);
+        assert!(PowerSampler::new(&[], &Settings::default()).sample(&(), 5).is_none());
+    }
+}

@@ -55,6 +55,12 @@ pub struct Settings {
     pub table_decay: f32,
     /// Biased, off at 0: lights whose table entry is below this share of the mean are ignored. Higher values drop more.
     pub ignore_below: f32,
+    /// `octree`: halvings of the scene's bounding cube per axis, 0..=7. Higher values fit lights to smaller places; lower
+    /// values fill fewer cells. 5.
+    pub octree_depth: u32,
+    /// `octree`: lights with a probability of their own in each cell. Higher values leave less to the rest that is
+    /// drawn by power; lower values fill cells faster. 64.
+    pub octree_bright: u32,
 }
 
 impl Default for Settings {
@@ -63,6 +69,8 @@ impl Default for Settings {
             min_probability_mass: 0.005,
             table_decay: 0.9,
             ignore_below: 0.0,
+            octree_depth: 5,
+            octree_bright: 64,
         }
     }
 }

@@ -275,3 +275,106 @@ impl LightSampler for TableSampler {
         records
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+
+    fn taught(scene: &Scene, settings: &Settings, frames: u32, visible: impl Fn(u32) -> bool) -> TableSampler {
+        let mut sampler = TableSampler::new(&scene.lights, settings);
+        for frame in 0..frames {
+            let logs = observe(&sampler, scene, frame, &visible);
+            sampler.end_frame(scene, &logs);
+        }
+        sampler
+    }
+
+    #[test]
+    fn keeps_the_promises_of_a_sampler() {
+        for count in [1, 2, 300] {
+            let scene = scene_of(mixed_lights(count, 3));
+            for frames in [0, 4] {
+                let sampler = taught(&scene, &Settings::default(), frames, |light| light % 3 == 0);
+                check(&sampler, &scene, &points(4, 5));
+                check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn starts_as_power_and_forgets_hidden_lights() {
+        let scene = scene_of(mixed_lights(200, 3));
+        let visible = |light: u32| light % 10 == 4;
+        let share = |frames| {
+            let records = taught(&scene, &Settings::default(), frames, visible).records(&scene);
+            (0..)
+                .zip(records)
+                .filter(|(light, _)| visible(*light))
+                .map(|(_, r)| r.probability)
+                .sum::<f64>()
+        };
+        let power = crate::PowerSampler::new(&scene.lights, &Settings::default());
+        let first = taught(&scene, &Settings::default(), 0, visible);
+        assert_eq!(
+            first.primary.distribution.as_ref().map(|d| d.pmf(7)),
+            Some(power.pmf(&(), 7))
+        );
+        let (before, after) = (share(0), share(16));
+        assert!(before < 0.3 && after > 0.85, "{before} {after}");
+    }
+
+    #[test]
+    fn first_and_later_hits_have_their_own_tables() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let mut sampler = TableSampler::new(&scene.lights, &Settings::default());
+        let mut logs = observe(&sampler, &scene, 0, |_| true);
+        for observation in logs.iter_mut().flatten() {
+            observation.point.primary = true;
+        }
+        sampler.end_frame(&scene, &logs);
+        assert!(sampler.secondary.is_none());
+        for observation in logs.iter_mut().flatten() {
+            observation.point.primary = false;
+            observation.visible = observation.light == 5;
+        }
+        sampler.end_frame(&scene, &logs);
+        let pmf = |primary: bool| sampler.table(primary).distribution.as_ref().unwrap().pmf(5);
+        assert!(pmf(false) > 2.0 * pmf(true));
+    }
+
+    #[test]
+    fn the_maximum_is_remembered_and_shrinks() {
+        let scene = scene_of(mixed_lights(50, 3));
+        let settings = Settings::default();
+        let mut sampler = TableSampler::new(&scene.lights, &settings);
+        let mut observation = observe(&sampler, &scene, 0, |_| true)[0][0];
+        observation.light = 9;
+        observation.point.primary = true;
+        observation.unshadowed = 3.0;
+        observation.visible = true;
+        sampler.end_frame(&scene, &[vec![observation]]);
+        assert_eq!(sampler.records(&scene)[9].max_contribution, 3.0);
+        sampler.end_frame(&scene, &[]);
+        sampler.end_frame(&scene, &[]);
+        let decayed = 3.0 * f64::from(settings.table_decay).powi(2);
+        assert!((sampler.records(&scene)[9].max_contribution - decayed).abs() < 1e-5);
+    }
+
+    #[test]
+    fn ignoring_is_off_until_asked_for_and_says_so() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let visible = |light: u32| light % 2 == 0;
+        let plain = taught(&scene, &Settings::default(), 8, visible);
+        assert!(plain.stats().biased.is_none());
+        let settings = Settings {
+            ignore_below: 0.5,
+            ..Settings::default()
+        };
+        let ignoring = taught(&scene, &settings, 8, visible);
+        assert!(ignoring.stats().biased.is_some());
+        let zero = |s: &TableSampler| s.records(&scene).iter().filter(|r| r.probability == 0.0).count();
+        assert_eq!(zero(&plain), 0);
+        assert!(zero(&ignoring) > 10);
+    }
+}

@@ -1,6 +1,6 @@
 //! Lights, points and checks that the tests of all samplers share.
 
-use crate::{LightSampler, ShadingPoint};
+use crate::{LightSampler, Observation, ShadingPoint};
 use glam::Vec3;
 use sampling::Random;
 use sampling::hemisphere::uniform_sphere;
@@ -175,4 +175,33 @@ pub(crate) fn check_each_light_is_drawn<S: LightSampler>(sampler: &S, scene: &Sc
             assert!((sum - 1.0).abs() < 0.05, "light {light} of probability {pmf}: {sum}");
         }
     }
+}
+
+/// What a frame of 4,000 samples would report if the lights for which `visible` holds were visible from everywhere: logs
+/// of several tiles, one of them empty.
+pub(crate) fn observe<S: LightSampler>(
+    sampler: &S,
+    scene: &Scene,
+    frame: u32,
+    visible: impl Fn(u32) -> bool,
+) -> Vec<Vec<Observation>> {
+    let mut logs = vec![Vec::new(); 4];
+    for (index, point) in (0_u32..).zip(points(4000, u64::from(frame) + 100)) {
+        let u = Random::new(13, index, frame).u32(0);
+        let Some(choice) = sampler.sample(&sampler.local(scene, &point), u) else {
+            continue;
+        };
+        let light = &scene.lights[choice.light as usize];
+        let unshadowed = light.unshadowed_irradiance(point.position_ws, point.normal_ws);
+        if unshadowed > 0.0 {
+            logs[index as usize * 3 / 4000].push(Observation {
+                point,
+                light: choice.light,
+                unshadowed,
+                pmf: choice.pmf,
+                visible: visible(choice.light),
+            });
+        }
+    }
+    logs
 }

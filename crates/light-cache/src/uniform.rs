@@ -95,3 +95,38 @@ impl LightSampler for UniformSampler {
         records::of_sampler(self, scene, &[])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, points, scene_of};
+
+    #[test]
+    fn keeps_the_promises_of_a_sampler() {
+        for count in [1, 2, 7, 300] {
+            let scene = scene_of(mixed_lights(count, 3));
+            let sampler = UniformSampler::new(&scene.lights);
+            check(&sampler, &scene, &points(4, 5));
+            check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+        }
+    }
+
+    #[test]
+    fn the_numbers_are_dealt_out_exactly() {
+        let sampler = UniformSampler::new(&mixed_lights(7, 1));
+        // 2^32 = 7 x 613,566,756 + 4.
+        let last = |light: u64| 613_566_756 * light + light.min(4) - 1;
+        for light in 1..=7 {
+            let at = |u: u64| sampler.sample(&(), u as u32).unwrap().light;
+            assert_eq!(u64::from(at(last(light))), light - 1);
+            if light < 7 {
+                assert_eq!(u64::from(at(last(light) + 1)), light);
+            }
+        }
+    }
+
+    #[test]
+    fn no_lights_no_choice() {
+        assert!(UniformSampler::new(&[]).sample(&(), 5).is_none());
+    }
+}

@@ -228,6 +228,20 @@ impl LeafLight {
         self.tag & ((1 << Self::INDEX_BITS) - 1)
     }
 
+    /// A point light's strength at `distance`, `cos_axis` off its axis, relative to that on the axis without an end (`KHR_lights_punctual`).
+    /// Zero only where the light has ended; a little more than exact next to there.
+    #[inline]
+    pub(crate) fn attenuation(&self, distance: f32, cos_axis: f32) -> f32 {
+        let cone = cos_axis.mul_add(self.cone_scale, self.cone_offset);
+        let relative_sq = distance * distance * self.inverse_range_sq;
+        let window = 1.0 - relative_sq * relative_sq;
+        if cone <= -1e-4 * self.cone_scale || window <= -1e-4 {
+            return 0.0;
+        }
+        let cone = cone.clamp(0.03, 1.0);
+        cone * cone * window.clamp(1e-4, 1.0)
+    }
+
     /// How it emits.
     #[inline]
     pub(crate) fn emission(&self) -> Emission {

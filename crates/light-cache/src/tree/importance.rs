@@ -8,7 +8,7 @@ use super::bounds::{Emission, LeafLight};
 use crate::ShadingPoint;
 use glam::Vec3;
 
-/// Share of its full strength that a light keeps just outside where it ends, against rounding at that border.
+/// Share of its full strength that a group keeps where it barely reaches, against rounding at that border.
 const MARGIN: f32 = 1e-4;
 
 /// Where the light is wanted, as importance reads it.
@@ -94,16 +94,11 @@ impl Receiver {
         if emission == Emission::Point {
             let d_sq = distance_sq.max(f32::MIN_POSITIVE.sqrt());
             let inverse_distance = 1.0 / d_sq.sqrt();
-            let cos_axis = -light.axis.dot(to) * inverse_distance;
-            let cone = cos_axis.mul_add(light.cone_scale, light.cone_offset);
-            let relative_sq = d_sq * light.inverse_range_sq;
-            let window = 1.0 - relative_sq * relative_sq;
-            if height <= 0.0 || cone <= -MARGIN * light.cone_scale || window <= -MARGIN {
+            if height <= 0.0 {
                 return 0.0;
             }
-            let cone = cone.clamp(0.03, 1.0);
-            let inverse_cubed = inverse_distance * inverse_distance * inverse_distance;
-            return light.weight * (height * inverse_cubed) * (cone * cone) * window.max(MARGIN);
+            let attenuation = light.attenuation(d_sq * inverse_distance, -light.axis.dot(to) * inverse_distance);
+            return light.weight * attenuation * (height * inverse_distance * inverse_distance * inverse_distance);
         }
         // Mean height over [height - radius, height + radius], what is below counted as 0.
         let height = if height >= radius {
@@ -121,7 +116,7 @@ impl Receiver {
         } else {
             plane
         };
-        if plane <= -MARGIN * radius {
+        if plane <= -1e-4 * radius {
             return 0.0;
         }
         let d_sq = distance_sq.max(0.5 * radius_sq).max(f32::MIN_POSITIVE.sqrt());

@@ -7,15 +7,19 @@
 //! subtree is a range of nodes and a range of lights, and stratified random numbers choose stratified lights.
 
 mod bounds;
+mod brightest;
 mod build;
+mod floor;
 mod importance;
 mod interval;
 mod sample;
 mod sampler;
 
 pub(crate) use bounds::LeafLight;
+pub(crate) use brightest::CellReceiver;
+pub(crate) use floor::Floor;
 pub(crate) use importance::Receiver;
-pub(crate) use interval::{PER_U32, UNIT, position, probability, split};
+pub(crate) use interval::{PER_U32, UNIT, position, probability};
 pub(crate) use sample::Descent;
 pub use sampler::TreeSampler;
 

@@ -106,23 +106,20 @@ impl<'t> Descent<'t> {
         self.width_of_slot(&weights, slot, width)
     }
 
-    /// Adds the probability of every light of an interval of `width` to `sum`, which is in scene order.
-    pub(crate) fn add_probabilities(&self, width: u64, sum: &mut [f64]) {
+    /// Adds to `sum`, which is in scene order, the probability of every light: its part of an interval of `width`, and the width `floor` that each has.
+    pub(crate) fn add_probabilities(&self, floor: u64, width: u64, sum: &mut [f64]) {
         let near = split(width, self.near, self.far);
         for place in 0..self.tree.distant.len() {
-            let own = self.width_of_distant(place, width - near);
+            let own = floor + self.width_of_distant(place, width - near);
             sum[self.tree.distant[place].index as usize] += f64::from(probability(own));
         }
         let Some(root) = self.tree.nodes.first() else { return };
         let mut open = vec![(root, near)];
         while let Some((node, width)) = open.pop() {
-            if width == 0 {
-                continue;
-            }
             if node.child == LEAF {
                 let weights = self.leaf(node);
                 for slot in 0..node.count as usize {
-                    let own = self.width_of_slot(&weights, slot, width);
+                    let own = floor + self.width_of_slot(&weights, slot, width);
                     let leaf = &self.tree.leaves[node.first as usize + slot];
                     sum[leaf.index() as usize] += f64::from(probability(own));
                 }

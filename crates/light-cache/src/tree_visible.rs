@@ -1,0 +1,228 @@
+//! The light tree with learned visibility.
+//!
+//! Every light's strength is multiplied by what has been seen of its visible share, every node's by the mean over its
+//! lights, so a descent avoids groups that are hidden from the image; importance at the point itself stays that of the plain tree.
+//!
+//! The visible share is a posterior mean with few pseudo-samples of a prior, and the prior is the share of the parent
+//! node (empirical Bayes, as in Vevoda, Kondapaneni and Krivanek 2018, "Bayesian online regression for adaptive direct
+//! illumination sampling"): lights that were never drawn borrow from their neighbours. It never reaches zero, so
+//! every light keeps its place in the tree, and a uniform floor is mixed in.
+
+mod visibility;
+
+use crate::records;
+use crate::tree::{Descent, Floor, Tree, position, probability};
+use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint};
+use scene::{Light, Scene};
+use std::time::Instant;
+use visibility::Visibility;
+
+/// Share by which the observations must have grown before the tree is weighted anew: later frames change little.
+const GROWTH: f64 = 0.02;
+
+/// The light tree, leaf flux times learned visibility.
+#[derive(Debug)]
+pub struct TreeVisibleSampler {
+    tree: Tree,
+    visibility: Visibility,
+    floor: Floor,
+    /// Observations since the tree was last weighted.
+    fresh: usize,
+    observations: u64,
+    build_s: f64,
+    learn_s: f64,
+}
+
+/// The tree as seen from one shading point.
+#[derive(Clone, Copy, Debug)]
+pub struct Local<'t> {
+    descent: Descent<'t>,
+    salt: u32,
+}
+
+impl TreeVisibleSampler {
+    /// Builds the tree over `lights`; nothing is known of visibility yet.
+    pub fn new(lights: &[Light], settings: &Settings) -> Self {
+        let start = Instant::now();
+        let tree = Tree::new(lights);
+        Self {
+            visibility: Visibility::new(&tree),
+            floor: Floor::new(settings.min_probability_mass, lights.len()),
+            fresh: 0,
+            observations: 0,
+            build_s: start.elapsed().as_secs_f64(),
+            learn_s: 0.0,
+            tree,
+        }
+    }
+
+    /// Learns from a frame; see [`LightSampler::end_frame`].
+    pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
+        let start = Instant::now();
+        for observation in logs.iter().flatten() {
+            self.visibility
+                .observe(self.tree.rank[observation.light as usize], observation);
+            self.fresh += 1;
+        }
+        // A pass over all lights has to be paid for by a fair number of observations.
+        if self.fresh > 0 && self.fresh >= self.tree.len() / 4 && self.fresh as f64 >= GROWTH * self.observations as f64
+        {
+            self.observations += self.fresh as u64;
+            self.fresh = 0;
+            self.visibility.apply(&mut self.tree);
+        }
+        self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    #[inline]
+    fn pmf_at(&self, local: &Local<'_>, place: u32) -> f32 {
+        probability(self.floor.width() + local.descent.width_of(place, self.floor.rest()))
+    }
+}
+
+impl LightSampler for TreeVisibleSampler {
+    type Local<'a> = Local<'a>;
+    const LEARNS: bool = true;
+
+    #[inline]
+    fn local(&self, _scene: &Scene, point: &ShadingPoint) -> Local<'_> {
+        Local {
+            descent: Descent::new(&self.tree, point.into()),
+            salt: point.salt(),
+        }
+    }
+
+    #[inline]
+    fn sample(&self, local: &Local<'_>, u: u32) -> Option<Choice> {
+        if !local.descent.alive() {
+            return None;
+        }
+        if let Some(place) = self.floor.draw(u) {
+            return Some(Choice {
+                light: self.tree.light_at(place),
+                pmf: self.pmf_at(local, place),
+            });
+        }
+        let x = position(u, local.salt) - self.floor.start_of_rest();
+        let (place, width) = local.descent.draw(x, self.floor.rest());
+        Some(Choice {
+            light: self.tree.light_at(place),
+            pmf: probability(self.floor.width() + width),
+        })
+    }
+
+    #[inline]
+    fn pmf(&self, local: &Local<'_>, light: u32) -> f32 {
+        if !local.descent.alive() {
+            return 0.0;
+        }
+        self.pmf_at(local, self.tree.rank[light as usize])
+    }
+
+    fn add_pmfs(&self, local: &Local<'_>, sum: &mut [f64]) {
+        if local.descent.alive() {
+            local
+                .descent
+                .add_probabilities(self.floor.width(), self.floor.rest(), sum);
+        }
+    }
+
+    fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
+        self.learn(logs);
+    }
+
+    fn stats(&self) -> SamplerStats {
+        SamplerStats {
+            bytes: self.tree.bytes() + self.visibility.bytes(),
+            min_probability: self.floor.probability(),
+            build_s: self.build_s,
+            learn_s: self.learn_s,
+            ..SamplerStats::default()
+        }
+    }
+
+    fn records(&self, scene: &Scene) -> Vec<LightRecord> {
+        let mut records = records::of_sampler(self, scene, &[]);
+        for (record, &place) in records.iter_mut().zip(&self.tree.rank) {
+            (record.samples, record.visible_fraction) = self.visibility.seen(place);
+        }
+        records
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+
+    #[test]
+    fn keeps_the_promises_of_a_sampler() {
+        for count in [1, 2, 5, 300] {
+            let scene = scene_of(mixed_lights(count, 3));
+            let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+            check(&sampler, &scene, &points(16, 5));
+            for frame in 0..4 {
+                let logs = observe(&sampler, &scene, frame, |light| light % 3 == 0);
+                sampler.end_frame(&scene, &logs);
+            }
+            check(&sampler, &scene, &points(16, 5));
+            check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+        }
+    }
+
+    #[test]
+    fn hidden_lights_lose_their_samples() {
+        let scene = scene_of(mixed_lights(200, 3));
+        let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        let visible = |light: u32| light % 10 == 4;
+        let share = |sampler: &TreeVisibleSampler| {
+            let records = sampler.records(&scene);
+            (0..)
+                .zip(records)
+                .filter(|(light, _)| visible(*light))
+                .map(|(_, r)| r.probability)
+                .sum::<f64>()
+        };
+        let before = share(&sampler);
+        for frame in 0..16 {
+            let logs = observe(&sampler, &scene, frame, visible);
+            sampler.end_frame(&scene, &logs);
+        }
+        let after = share(&sampler);
+        assert!(before < 0.3 && after > 0.85, "{before} {after}");
+    }
+
+    #[test]
+    fn a_giant_that_is_never_visible_is_soon_left_alone() {
+        let mut lights = mixed_lights(500, 3);
+        lights[8].intensity *= 1e6;
+        let scene = scene_of(lights);
+        let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        assert!(sampler.records(&scene)[8].probability > 0.9);
+        for frame in 0..8 {
+            let logs = observe(&sampler, &scene, frame, |light| light != 8);
+            sampler.end_frame(&scene, &logs);
+        }
+        let giant = sampler.records(&scene)[8];
+        assert!(giant.probability < 0.1, "{giant:?}");
+        assert_eq!(giant.visible_fraction, 0.0);
+    }
+
+    #[test]
+    fn learning_does_not_depend_on_how_tiles_are_cut() {
+        let scene = scene_of(mixed_lights(200, 3));
+        let mut whole = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        let mut tiles = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        let logs = observe(&whole, &scene, 0, |light| light % 2 == 0);
+        whole.end_frame(&scene, &[logs.concat()]);
+        tiles.end_frame(&scene, &logs);
+        let weights = |s: &TreeVisibleSampler| {
+            s.tree
+                .leaves
+                .iter()
+                .map(|leaf| leaf.weight.to_bits())
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(weights(&whole), weights(&tiles));
+    }
+}

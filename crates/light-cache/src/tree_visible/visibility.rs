@@ -1,0 +1,189 @@
+//! How much of each light reaches the image, learned from shadow rays.
+
+use crate::Observation;
+use crate::tree::{LEAF, Tree};
+
+/// Pseudo-samples of the prior. Higher values believe neighbours longer; lower values believe few shadow rays.
+const PRIOR_SAMPLES: f32 = 2.0;
+/// Visible share of the whole scene before anything is known.
+const ROOT_VISIBLE: f32 = 0.5;
+/// What one light can tell about its neighbours, in samples: a light that takes all samples must not speak for all.
+const MAX_SAMPLES_OF_LIGHT: f32 = 8.0;
+/// What one group of lights can tell about the groups around it.
+const MAX_SAMPLES_OF_GROUP: f32 = 64.0;
+/// Samples of a light after which the older half is forgotten, so that changes are followed.
+const MEMORY: f32 = 65_536.0;
+/// A contribution above this many times the light's mean counts as that many.
+const SPIKE: f32 = 4.0;
+/// No share is believed to be smaller: keeps sums over a tree within the range of `f32`.
+const MIN_VISIBLE: f32 = 1e-9;
+
+/// Evidence about a light or a group: shadow rays, and how many arrived, each weighted by the energy at stake.
+#[derive(Clone, Copy, Debug, Default)]
+struct Evidence {
+    samples: f32,
+    visible: f32,
+}
+
+impl Evidence {
+    fn share(self, prior: f32) -> f32 {
+        (self.visible + PRIOR_SAMPLES * prior) / (self.samples + PRIOR_SAMPLES)
+    }
+
+    fn at_most(self, samples: f32) -> Self {
+        let scale = if self.samples > samples {
+            samples / self.samples
+        } else {
+            1.0
+        };
+        Self {
+            samples: self.samples * scale,
+            visible: self.visible * scale,
+        }
+    }
+
+    fn plus(self, other: Self) -> Self {
+        Self {
+            samples: self.samples + other.samples,
+            visible: self.visible + other.visible,
+        }
+    }
+}
+
+/// What is known of one light.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    evidence: Evidence,
+    /// Running mean of the unshadowed contribution, by which each observation is measured.
+    mean: f32,
+    /// Shadow rays in all.
+    rays: u32,
+    arrived: u32,
+}
+
+/// Visible shares of all lights and of all groups of a tree.
+#[derive(Clone, Debug)]
+pub(super) struct Visibility {
+    /// In tree order.
+    seen: Vec<Seen>,
+    /// Strengths without visibility, in tree order.
+    strengths: Vec<f32>,
+    /// Per node: evidence, then the believed share.
+    groups: Vec<(Evidence, f32)>,
+}
+
+impl Visibility {
+    /// Nothing is known yet about the lights of `tree`.
+    pub(super) fn new(tree: &Tree) -> Self {
+        let strengths = tree.leaves.iter().map(|leaf| leaf.weight);
+        Self {
+            seen: vec![Seen::default(); tree.len()],
+            strengths: strengths.chain(tree.distant.iter().map(|light| light.weight)).collect(),
+            groups: vec![(Evidence::default(), ROOT_VISIBLE); tree.nodes.len()],
+        }
+    }
+
+    /// Takes note of a shadow ray towards the light at `place` in tree order.
+    pub(super) fn observe(&mut self, place: u32, observation: &Observation) {
+        let seen = &mut self.seen[place as usize];
+        seen.rays += 1;
+        seen.arrived += u32::from(observation.visible);
+        if seen.evidence.samples > MEMORY {
+            seen.evidence = seen.evidence.at_most(0.5 * MEMORY);
+        }
+        let weight = if seen.mean > 0.0 {
+            (observation.unshadowed / seen.mean).min(SPIKE)
+        } else {
+            1.0
+        };
+        // The mean itself is robust too: spikes count as SPIKE times what it was.
+        let rate = 1.0 / (seen.rays.min(1024) as f32);
+        let clamped = if seen.mean > 0.0 {
+            observation.unshadowed.min(SPIKE * seen.mean)
+        } else {
+            observation.unshadowed
+        };
+        seen.mean += (clamped - seen.mean) * rate;
+        seen.evidence.samples += weight;
+        if observation.visible {
+            seen.evidence.visible += weight;
+        }
+    }
+
+    /// Weighs the tree by what is known.
+    pub(super) fn apply(&mut self, tree: &mut Tree) {
+        // Bottom up: children come after their parents.
+        for index in (0..tree.nodes.len()).rev() {
+            let node = &tree.nodes[index];
+            let evidence = if node.child == LEAF {
+                let range = node.first as usize..(node.first + node.count) as usize;
+                let lights = self.seen[range]
+                    .iter()
+                    .map(|seen| seen.evidence.at_most(MAX_SAMPLES_OF_LIGHT));
+                lights.fold(Evidence::default(), Evidence::plus)
+            } else {
+                let child = |i: u32| self.groups[(node.child + i) as usize].0;
+                child(0).plus(child(1))
+            };
+            self.groups[index].0 = evidence.at_most(MAX_SAMPLES_OF_GROUP);
+        }
+        // Top down: each group's share, with its parent's as the prior.
+        for index in 0..tree.nodes.len() {
+            let prior = if index == 0 {
+                ROOT_VISIBLE
+            } else {
+                self.groups[tree.nodes[index].parent as usize].1
+            };
+            self.groups[index].1 = self.groups[index].0.share(prior);
+        }
+        let Self {
+            seen,
+            strengths,
+            groups,
+        } = self;
+        // Bottom up again: the lights, then the sums.
+        for index in (0..tree.nodes.len()).rev() {
+            let node = tree.nodes[index];
+            tree.nodes[index].weight = if node.child == LEAF {
+                let prior = groups[index].1;
+                (node.first as usize..(node.first + node.count) as usize)
+                    .map(|place| {
+                        let weight = strengths[place] * light_factor(&seen[place], prior);
+                        tree.leaves[place].weight = weight;
+                        weight
+                    })
+                    .sum()
+            } else {
+                tree.nodes[node.child as usize].weight + tree.nodes[node.child as usize + 1].weight
+            };
+        }
+        let near = tree.leaves.len();
+        for (place, light) in (near..).zip(&mut tree.distant) {
+            light.weight = strengths[place] * light_factor(&seen[place], ROOT_VISIBLE);
+        }
+    }
+
+    /// Shadow rays towards a light, and the share that arrived (NaN if there were none).
+    pub(super) fn seen(&self, place: u32) -> (u64, f64) {
+        let seen = &self.seen[place as usize];
+        (u64::from(seen.rays), f64::from(seen.arrived) / f64::from(seen.rays))
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        size_of_val(&self.seen[..]) + size_of_val(&self.strengths[..]) + size_of_val(&self.groups[..])
+    }
+}
+
+/// By what a light's strength is multiplied.
+fn light_factor(seen: &Seen, prior: f32) -> f32 {
+    let share = seen.evidence.share(prior);
+    // Never seen in many samples: more likely hidden altogether than barely visible. With an even chance of either
+    // and all visible shares alike, the chance that it is visible at all is 1 / (1 + samples).
+    let alive = if seen.evidence.visible > 0.0 {
+        1.0
+    } else {
+        1.0 / (1.0 + 0.25 * seen.evidence.samples)
+    };
+    (share * alive).max(MIN_VISIBLE).sqrt()
+}
