@@ -46,14 +46,20 @@ fn main() {
         failed += i32::from(seconds > 5.0);
         println!("{seconds:7.3} s  {}  {line}", file.display());
     }
-    println!("{} files: {loaded} loaded, {refused} refused, {failed} crashed or too slow", files.len());
+    println!(
+        "{} files: {loaded} loaded, {refused} refused, {failed} crashed or too slow",
+        files.len()
+    );
     std::process::exit(i32::from(failed > 0));
 }
 
 fn collect(path: &Path, files: &mut Vec<PathBuf>) {
     if let Ok(entries) = std::fs::read_dir(path) {
         entries.flatten().for_each(|entry| collect(&entry.path(), files));
-    } else if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb")) {
+    } else if path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gltf") || e.eq_ignore_ascii_case("glb"))
+    {
         files.push(path.into());
     }
 }

@@ -51,7 +51,11 @@ pub struct TextureRef {
 static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         let c = code as f32 / 255.0;
-        if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+        if c <= 0.04045 {
+            c / 12.92
+        } else {
+            ((c + 0.055) / 1.055).powf(2.4)
+        }
     })
 });
 
@@ -73,9 +77,7 @@ impl Texture {
             };
             self.filter([x0, x1], [y0, y1], Vec2::new(fx, fy), decode)
         } else {
-            let decode = |[r, g, b, a]: [u8; 4]| {
-                Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a))
-            };
+            let decode = |[r, g, b, a]: [u8; 4]| Vec4::new(f32::from(r), f32::from(g), f32::from(b), f32::from(a));
             self.filter([x0, x1], [y0, y1], Vec2::new(fx, fy), decode) / 255.0
         }
     }
@@ -160,7 +162,10 @@ mod tests {
         assert_eq!([-0.125, 1.125, 2.375].map(|u| at(Wrap::Repeat, u)), [240.0, 0.0, 80.0]);
         assert_eq!([-0.125, 1.125, 2.375].map(|u| at(Wrap::Mirror, u)), [0.0, 240.0, 80.0]);
         assert_eq!([-0.375, 1.125, 9.0].map(|u| at(Wrap::Clamp, u)), [0.0, 240.0, 240.0]);
-        assert!((red(&gradient(Wrap::Repeat, false), 0.0) - 120.0).abs() < 1e-3, "across the seam");
+        assert!(
+            (red(&gradient(Wrap::Repeat, false), 0.0) - 120.0).abs() < 1e-3,
+            "across the seam"
+        );
         assert!(red(&gradient(Wrap::Mirror, false), 0.0).abs() < 1e-3);
     }
 
@@ -184,6 +189,9 @@ mod tests {
             ..gradient(Wrap::Repeat, false)
         };
         let value = texture.sample(Vec2::ZERO);
-        assert!(value.abs_diff_eq(Vec4::new(0.5029, 0.0, 1.0, 128.0 / 255.0), 1e-4), "{value}");
+        assert!(
+            value.abs_diff_eq(Vec4::new(0.5029, 0.0, 1.0, 128.0 / 255.0), 1e-4),
+            "{value}"
+        );
     }
 }

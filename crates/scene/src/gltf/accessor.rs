@@ -106,7 +106,9 @@ impl<'a> Accessor<'a> {
             // `view` has found it, so it is there.
             let stride = source.json.buffer_views[view].byte_stride.unwrap_or(element);
             if stride < element {
-                return Err(bad(format!("byteStride {stride} is less than an element of {element} bytes")));
+                return Err(bad(format!(
+                    "byteStride {stride} is less than an element of {element} bytes"
+                )));
             }
             let end = match count {
                 0 => Some(0),
@@ -136,14 +138,22 @@ impl<'a> Accessor<'a> {
             None => None,
             Some(sparse) => {
                 if sparse.count > json.count {
-                    return Err(bad(format!("{} sparse values for {} elements", sparse.count, json.count)));
+                    return Err(bad(format!(
+                        "{} sparse values for {} elements",
+                        sparse.count, json.count
+                    )));
                 }
                 let kind = Component::from_gl(sparse.indices.component_type)
                     .filter(|kind| matches!(kind, Component::U8 | Component::U16 | Component::U32))
                     .ok_or_else(|| bad("sparse indices are not unsigned integers".into()))?;
                 let indices = &sparse.indices;
                 let raw = strided(indices.buffer_view, indices.byte_offset, sparse.count, kind.size())?;
-                let values = strided(sparse.values.buffer_view, sparse.values.byte_offset, sparse.count, element)?;
+                let values = strided(
+                    sparse.values.buffer_view,
+                    sparse.values.byte_offset,
+                    sparse.count,
+                    element,
+                )?;
                 let numbers: Vec<u32> = (0..sparse.count as usize).map(|i| raw.unsigned(i, kind)).collect();
                 if !numbers.is_sorted_by(|a, b| a < b) || numbers.last().is_some_and(|&n| u64::from(n) >= json.count) {
                     return Err(bad("sparse indices are not increasing, or out of range".into()));

@@ -45,11 +45,19 @@ impl Bounds {
 
     /// Centre; the origin if empty.
     pub(super) fn center(&self) -> Vec3 {
-        if self.is_empty() { Vec3::ZERO } else { 0.5 * (self.min + self.max) }
+        if self.is_empty() {
+            Vec3::ZERO
+        } else {
+            0.5 * (self.min + self.max)
+        }
     }
 
     /// Radius of the sphere around the box; 0 if empty.
     pub(super) fn radius(&self) -> f32 {
-        if self.is_empty() { 0.0 } else { 0.5 * self.min.distance(self.max) }
+        if self.is_empty() {
+            0.0
+        } else {
+            0.5 * self.min.distance(self.max)
+        }
     }
 }

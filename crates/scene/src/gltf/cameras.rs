@@ -35,7 +35,9 @@ pub(super) fn read(
             .get(index)
             .ok_or_else(|| source.no_such(&place, "camera", index, all.len()))?;
         let Some(world_from_camera) = pose(node) else {
-            report.warn(format!("{place}: its camera has no direction or is too far away, left out"));
+            report.warn(format!(
+                "{place}: its camera has no direction or is too far away, left out"
+            ));
             continue;
         };
         let distance = bounds.center().distance(world_from_camera.translation.into());
@@ -84,8 +86,14 @@ fn fov_y(camera: &json::Camera, distance: f32, place: &str, report: &mut Report)
     if let Some(orthographic) = &camera.orthographic {
         report.ignore("orthographic cameras (replaced by perspective ones that see as much at the scene's centre)");
         let half = (orthographic.ymag.abs() / distance).atan();
-        return if half.is_finite() { (2.0 * half).clamp(0.05, 2.0) } else { DEFAULT_FOV_Y };
+        return if half.is_finite() {
+            (2.0 * half).clamp(0.05, 2.0)
+        } else {
+            DEFAULT_FOV_Y
+        };
     }
-    report.warn(format!("{place}: its camera has no projection, angle of view set to {DEFAULT_FOV_Y}"));
+    report.warn(format!(
+        "{place}: its camera has no projection, angle of view set to {DEFAULT_FOV_Y}"
+    ));
     DEFAULT_FOV_Y
 }

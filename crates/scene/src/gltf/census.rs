@@ -5,12 +5,13 @@ use super::source::Source;
 use crate::{Report, SceneError};
 use std::collections::BTreeSet;
 
-/// Extensions that are done in full, or (`KHR_materials_unlit`) close enough to show a file that requires them.
-const SUPPORTED: [&str; 8] = [
+/// Extensions that are done in full, or, with what is missing reported, well enough to show a file that requires them.
+const SUPPORTED: [&str; 9] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_unlit",
     "KHR_mesh_quantization",
@@ -23,7 +24,11 @@ const SUPPORTED: [&str; 8] = [
 /// [`SceneError::Invalid`] naming the extensions.
 pub(super) fn refuse_required(source: &Source) -> Result<(), SceneError> {
     let required = &source.json.extensions_required;
-    let missing: Vec<&str> = required.iter().map(String::as_str).filter(|name| !SUPPORTED.contains(name)).collect();
+    let missing: Vec<&str> = required
+        .iter()
+        .map(String::as_str)
+        .filter(|name| !SUPPORTED.contains(name))
+        .collect();
     if missing.is_empty() {
         return Ok(());
     }
@@ -48,7 +53,10 @@ pub(super) fn count_ignored(json: &Root, report: &mut Report) {
     json.scenes.iter().for_each(|o| count(&o.extensions.others));
     json.nodes.iter().for_each(|o| count(&o.extensions.others));
     json.meshes.iter().for_each(|o| count(&o.extensions.others));
-    json.meshes.iter().flat_map(|o| &o.primitives).for_each(|o| count(&o.extensions.others));
+    json.meshes
+        .iter()
+        .flat_map(|o| &o.primitives)
+        .for_each(|o| count(&o.extensions.others));
     json.accessors.iter().for_each(|o| count(&o.extensions.others));
     json.buffer_views.iter().for_each(|o| count(&o.extensions.others));
     json.buffers.iter().for_each(|o| count(&o.extensions.others));

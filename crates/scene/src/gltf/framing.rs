@@ -48,7 +48,10 @@ fn interior(parts: &SceneParts, center: Vec3, radius: f32) -> Camera {
             Vec3::new(cos, 0.0, sin)
         })
         .collect();
-    let free: Vec<f32> = probe(parts, center, &headings).iter().map(|hit| hit.t.min(radius)).collect();
+    let free: Vec<f32> = probe(parts, center, &headings)
+        .iter()
+        .map(|hit| hit.t.min(radius))
+        .collect();
     let behind = |i: usize| free[(i + HEADINGS / 2) % HEADINGS];
     let way = |i: usize| free[i] + behind(i);
     let best = (1..HEADINGS).fold(0, |best, i| if way(i) > way(best) { i } else { best });
@@ -77,7 +80,9 @@ fn probe(parts: &SceneParts, origin: Vec3, directions: &[Vec3]) -> Vec<Probe> {
         let mesh = &parts.meshes[instance.mesh as usize];
         let mirrored = instance.world_from_local.matrix3.determinant() < 0.0;
         for i in 0..mesh.len().min(left) {
-            let corners = mesh.corners(i).map(|p| instance.world_from_local.transform_point3(p) - origin);
+            let corners = mesh
+                .corners(i)
+                .map(|p| instance.world_from_local.transform_point3(p) - origin);
             for (hit, &direction) in nearest.iter_mut().zip(directions) {
                 if let Some((t, back)) = intersect(corners, direction)
                     && t < hit.t

@@ -104,7 +104,11 @@ impl<'a> PrimitiveReader<'a> {
         let corners = self.corners(positions.len(), budget)?;
         let mut triangles = assemble(mode, &corners);
         if mode == 4 && corners.len() % 3 != 0 {
-            report.warn(format!("{}: {} indices are no multiple of 3", self.place, corners.len()));
+            report.warn(format!(
+                "{}: {} indices are no multiple of 3",
+                self.place,
+                corners.len()
+            ));
         }
         if triangles.is_empty() {
             report.warn(format!("{}: no triangles, left out", self.place));
@@ -129,7 +133,10 @@ impl<'a> PrimitiveReader<'a> {
             }
             match self.attribute(name, &["VEC2"])? {
                 Some(uvs) => *stream = self.stream(name, &uvs, positions.len(), &used, uv)?,
-                None => report.warn(format!("{}: its material has a texture, but there is no {name}", self.place)),
+                None => report.warn(format!(
+                    "{}: its material has a texture, but there is no {name}",
+                    self.place
+                )),
             }
         }
         if let Some(colors) = self.attribute("COLOR_0", &["VEC3", "VEC4"])? {
@@ -230,11 +237,15 @@ impl<'a> PrimitiveReader<'a> {
         if accessor.len() != count {
             return Err(self.invalid(format!("{name} has {} elements, POSITION {count}", accessor.len())));
         }
-        Ok(used.iter().map(|&vertex| read(accessor.floats(vertex as usize))).collect())
+        Ok(used
+            .iter()
+            .map(|&vertex| read(accessor.floats(vertex as usize)))
+            .collect())
     }
 
     fn invalid(&self, problem: impl Into<String>) -> SceneError {
-        self.source.invalid(&self.place, problem, "the file is damaged: export it again")
+        self.source
+            .invalid(&self.place, problem, "the file is damaged: export it again")
     }
 }
 
@@ -250,7 +261,13 @@ fn assemble(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
         5 => corners
             .windows(3)
             .enumerate()
-            .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
+            .map(|(i, w)| {
+                if i % 2 == 0 {
+                    [w[0], w[1], w[2]]
+                } else {
+                    [w[0], w[2], w[1]]
+                }
+            })
             .filter(solid)
             .collect(),
         6 => corners

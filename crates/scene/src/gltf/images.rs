@@ -112,7 +112,11 @@ impl Images {
         let mut textures: Vec<(u32, Texture)> = Vec::new();
         for (texture, uses) in decoded.into_iter().zip(uses.into_values()) {
             let (last, others) = uses.split_last().expect("an image is listed because of a use");
-            textures.extend(others.iter().map(|(number, key)| (*number, finish(texture.clone(), key))));
+            textures.extend(
+                others
+                    .iter()
+                    .map(|(number, key)| (*number, finish(texture.clone(), key))),
+            );
             textures.push((last.0, finish(texture, &last.1)));
         }
         textures.sort_by_key(|(number, _)| *number);

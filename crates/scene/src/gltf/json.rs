@@ -67,6 +67,7 @@ extensions!(
         emissive_strength: EmissiveStrength = "KHR_materials_emissive_strength",
         specular: Specular = "KHR_materials_specular",
         ior: Ior = "KHR_materials_ior",
+        specular_glossiness: SpecularGlossiness = "KHR_materials_pbrSpecularGlossiness",
         unlit: IgnoredAny = "KHR_materials_unlit",
     }
 );
@@ -335,6 +336,29 @@ impl Default for Specular {
     }
 }
 
+/// The archived extension that many older files still have.
+#[derive(Debug, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+pub(super) struct SpecularGlossiness {
+    pub(super) diffuse_factor: [f32; 4],
+    pub(super) diffuse_texture: Option<TextureRef>,
+    pub(super) specular_factor: [f32; 3],
+    pub(super) glossiness_factor: f32,
+    pub(super) specular_glossiness_texture: Option<IgnoredAny>,
+}
+
+impl Default for SpecularGlossiness {
+    fn default() -> Self {
+        Self {
+            diffuse_factor: [1.0; 4],
+            diffuse_texture: None,
+            specular_factor: [1.0; 3],
+            glossiness_factor: 1.0,
+            specular_glossiness_texture: None,
+        }
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(default)]
 pub(super) struct Ior {
@@ -421,6 +445,8 @@ pub(super) enum PunctualKind {
     Point,
     Spot,
     Directional,
+    #[serde(other)]
+    Unknown,
 }
 
 #[derive(Debug, Deserialize)]

@@ -27,7 +27,10 @@ pub(super) fn read(
         let light = lights
             .get(reference.light)
             .ok_or_else(|| source.no_such(&place, "light", reference.light, lights.len()))?;
-        let name = light.name.clone().unwrap_or_else(|| format!("light {}", reference.light));
+        let name = light
+            .name
+            .clone()
+            .unwrap_or_else(|| format!("light {}", reference.light));
         if let Some(record) = record(light, node, &format!("{place}, light '{name}'"), report) {
             let origin = LightSource {
                 node: json.name.clone().unwrap_or(place),
@@ -42,8 +45,21 @@ pub(super) fn read(
 }
 
 fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report) -> Option<Light> {
+    let kind = match json.kind {
+        PunctualKind::Point => LightKind::Point,
+        PunctualKind::Spot => LightKind::Spot,
+        PunctualKind::Directional => LightKind::Directional,
+        PunctualKind::Unknown => {
+            report.ignore("punctual lights of an unknown type");
+            return None;
+        }
+    };
     let intensity = Vec3::from(json.color.unwrap_or([1.0; 3])) * json.intensity.unwrap_or(1.0);
-    let clean = Vec3::from(intensity.to_array().map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 }));
+    let clean = Vec3::from(
+        intensity
+            .to_array()
+            .map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 }),
+    );
     if clean != intensity {
         report.warn(format!("{place}: intensity is negative or not finite, set to 0 there"));
     }
@@ -54,13 +70,10 @@ fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report)
     let position_ws = node.world.translation.as_vec3();
     // Lights look along their local -z (KHR_lights_punctual, "Directional").
     let axis_ws = (-node.world.matrix3.z_axis).normalize_or_zero().as_vec3();
-    let kind = match json.kind {
-        PunctualKind::Point => LightKind::Point,
-        PunctualKind::Spot => LightKind::Spot,
-        PunctualKind::Directional => LightKind::Directional,
-    };
     if axis_ws == Vec3::ZERO && kind != LightKind::Point {
-        report.warn(format!("{place}: its node is scaled to nothing, so that it has no direction; left out"));
+        report.warn(format!(
+            "{place}: its node is scaled to nothing, so that it has no direction; left out"
+        ));
         return None;
     }
     if !(position_ws.abs().max_element() <= super::geometry::MAX_COORDINATE) && kind != LightKind::Directional {
@@ -91,13 +104,21 @@ fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report)
         kind,
         double_sided: false,
         textured: false,
-        position_ws: if kind == LightKind::Directional { Vec3::ZERO } else { position_ws },
+        position_ws: if kind == LightKind::Directional {
+            Vec3::ZERO
+        } else {
+            position_ws
+        },
         edge1_ws: Vec3::ZERO,
         edge2_ws: Vec3::ZERO,
         normal_ws: if kind == LightKind::Point { Vec3::ZERO } else { axis_ws },
         intensity: clean,
         area: 0.0,
-        range: if kind == LightKind::Directional { f32::INFINITY } else { range },
+        range: if kind == LightKind::Directional {
+            f32::INFINITY
+        } else {
+            range
+        },
         cos_inner,
         cos_outer,
         power,
@@ -111,8 +132,16 @@ fn cone(json: &PunctualLight, place: &str, report: &mut Report) -> (f32, f32) {
     if inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-4 {
         return (inner.cos(), outer.min(FRAC_PI_2).cos().max(0.0));
     }
-    let fixed_outer = if outer > 0.0 { outer.min(FRAC_PI_2) } else { FRAC_PI_2 / 2.0 };
-    let fixed_inner = if inner > 0.0 { inner.min(0.99 * fixed_outer) } else { 0.0 };
+    let fixed_outer = if outer > 0.0 {
+        outer.min(FRAC_PI_2)
+    } else {
+        FRAC_PI_2 / 2.0
+    };
+    let fixed_inner = if inner > 0.0 {
+        inner.min(0.99 * fixed_outer)
+    } else {
+        0.0
+    };
     report.warn(format!(
         "{place}: cone angles {inner} and {outer} rad are not in order 0 <= inner < outer <= pi/2, \
          taken as {fixed_inner} and {fixed_outer}"

@@ -66,12 +66,15 @@ impl MaterialReader<'_> {
         let pbr = &json.pbr_metallic_roughness;
         let unlit = json.extensions.unlit.is_some();
         if unlit && self.used {
-            self.report.ignore("KHR_materials_unlit (shown as a lit, rough surface of its base colour)");
+            self.report
+                .ignore("KHR_materials_unlit (shown as a lit, rough surface of its base colour)");
         }
         let [r, g, b, a] = pbr.base_color_factor;
         let base_color = Vec3::from(self.unit("baseColorFactor", [r, g, b]));
-        let [metallic, roughness, alpha] =
-            self.unit("metallicFactor, roughnessFactor or alpha", [pbr.metallic_factor, pbr.roughness_factor, a]);
+        let [metallic, roughness, alpha] = self.unit(
+            "metallicFactor, roughnessFactor or alpha",
+            [pbr.metallic_factor, pbr.roughness_factor, a],
+        );
         let (dielectric_f0, dielectric_f90) = if unlit { (Vec3::ZERO, 0.0) } else { self.dielectric() };
         let emission = self.emission();
         let mut material = Material {
@@ -86,18 +89,55 @@ impl MaterialReader<'_> {
             double_sided: json.double_sided,
             ..Material::lambert(&name, base_color)
         };
+        if let Some(archived) = &json.extensions.specular_glossiness {
+            self.specular_glossiness(archived, &mut material)?;
+            return Ok(material);
+        }
         if !self.used {
             return Ok(material);
         }
         material.base_color_texture = self.texture(pbr.base_color_texture.as_ref(), true)?;
         if !unlit {
             material.metallic_roughness_texture = self.texture(pbr.metallic_roughness_texture.as_ref(), false)?;
-            self.normal_map(&mut material)?;
+        }
+        self.normal_and_emission(&mut material)?;
+        Ok(material)
+    }
+
+    /// `KHR_materials_pbrSpecularGlossiness`, archived: a dielectric of any reflectance says the same, but for the texture.
+    fn specular_glossiness(
+        &mut self,
+        json: &json::SpecularGlossiness,
+        material: &mut Material,
+    ) -> Result<(), SceneError> {
+        let specular = Vec3::from(self.unit("specularFactor", json.specular_factor));
+        let [r, g, b, alpha] = self.unit("diffuseFactor", json.diffuse_factor);
+        let [glossiness] = self.unit("glossinessFactor", [json.glossiness_factor]);
+        material.base_color = Vec3::new(r, g, b);
+        material.alpha = alpha;
+        material.metallic = 0.0;
+        material.roughness = 1.0 - glossiness;
+        material.dielectric_f0 = specular;
+        material.dielectric_f90 = 1.0;
+        if self.used {
+            if json.specular_glossiness_texture.is_some() {
+                self.report
+                    .ignore("specularGlossinessTexture of KHR_materials_pbrSpecularGlossiness");
+            }
+            material.base_color_texture = self.texture(json.diffuse_texture.as_ref(), true)?;
+            self.normal_and_emission(material)?;
+        }
+        Ok(())
+    }
+
+    fn normal_and_emission(&mut self, material: &mut Material) -> Result<(), SceneError> {
+        if self.json.extensions.unlit.is_none() {
+            self.normal_map(material)?;
         }
         if material.emits() {
-            material.emissive_texture = self.texture(json.emissive_texture.as_ref(), true)?;
+            material.emissive_texture = self.texture(self.json.emissive_texture.as_ref(), true)?;
         }
-        Ok(material)
+        Ok(())
     }
 
     fn normal_map(&mut self, material: &mut Material) -> Result<(), SceneError> {
@@ -106,7 +146,8 @@ impl MaterialReader<'_> {
         };
         let scale = json.scale.unwrap_or(1.0);
         if !scale.is_finite() {
-            self.report.warn(format!("{}: normal scale {scale}, normal map left out", self.place));
+            self.report
+                .warn(format!("{}: normal scale {scale}, normal map left out", self.place));
         } else if scale != 0.0 {
             material.normal_scale = scale;
             material.normal_texture = self.texture(Some(json), false)?;
@@ -136,14 +177,25 @@ impl MaterialReader<'_> {
         }
         let [weight] = self.unit("specularFactor", [specular.specular_factor]);
         let color = Vec3::from(specular.specular_color_factor);
-        let color = if color.is_finite() { color.max(Vec3::ZERO) } else { Vec3::ONE };
+        let color = if color.is_finite() {
+            color.max(Vec3::ZERO)
+        } else {
+            Vec3::ONE
+        };
         ((f0 * color).min(Vec3::ONE) * weight, weight)
     }
 
     fn emission(&mut self) -> Vec3 {
-        let strength = self.json.extensions.emissive_strength.as_ref().map_or(1.0, |e| e.emissive_strength);
+        let strength = self
+            .json
+            .extensions
+            .emissive_strength
+            .as_ref()
+            .map_or(1.0, |e| e.emissive_strength);
         let emission = Vec3::from(self.json.emissive_factor) * strength;
-        let clean = emission.to_array().map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
+        let clean = emission
+            .to_array()
+            .map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
         if clean != emission.to_array() {
             self.report.warn(format!(
                 "{}: emission ({}, {}, {}) is negative or not finite, set to ({}, {}, {})",
@@ -159,7 +211,8 @@ impl MaterialReader<'_> {
             AlphaMode::Mask => Some(self.json.alpha_cutoff.filter(|c| c.is_finite()).unwrap_or(0.5)),
             AlphaMode::Blend => {
                 if self.used {
-                    self.report.ignore("alphaMode BLEND (surfaces of alpha below 0.5 are left out, others are opaque)");
+                    self.report
+                        .ignore("alphaMode BLEND (surfaces of alpha below 0.5 are left out, others are opaque)");
                 }
                 Some(0.5)
             }
@@ -170,7 +223,8 @@ impl MaterialReader<'_> {
     fn unit<const N: usize>(&mut self, what: &str, values: [f32; N]) -> [f32; N] {
         let clean = values.map(|v| if v > 0.0 { v.min(1.0) } else { 0.0 });
         if clean != values {
-            self.report.warn(format!("{}: {what} outside 0 to 1, clamped", self.place));
+            self.report
+                .warn(format!("{}: {what} outside 0 to 1, clamped", self.place));
         }
         clean
     }
@@ -183,7 +237,10 @@ impl MaterialReader<'_> {
             self.report.ignore("textures on TEXCOORD_2 and above");
             return Ok(None);
         }
-        let Some(texture) = self.images.request(self.source, &self.place, json.index, srgb, self.report)? else {
+        let Some(texture) = self
+            .images
+            .request(self.source, &self.place, json.index, srgb, self.report)?
+        else {
             return Ok(None);
         };
         let (columns, offset) = self.transform(transform);
@@ -211,7 +268,8 @@ impl MaterialReader<'_> {
         if columns.is_finite() && offset.is_finite() {
             return (columns, offset);
         }
-        self.report.warn(format!("{}: texture transform is not finite, left out", self.place));
+        self.report
+            .warn(format!("{}: texture transform is not finite, left out", self.place));
         (Mat2::IDENTITY, Vec2::ZERO)
     }
 }

@@ -88,7 +88,12 @@ pub(super) fn append(mesh: &mut Mesh, part: &Mesh, motion: Option<&Motion>) {
     fill.extend(&mut mesh.normals, &part.normals, Vec3::ZERO, normal);
     fill.extend(&mut mesh.uvs, &part.uvs, Vec2::ZERO, |uv| uv);
     fill.extend(&mut mesh.uvs1, &part.uvs1, Vec2::ZERO, |uv| uv);
-    fill.extend(&mut mesh.tangents, &part.tangents, Vec4::new(1.0, 0.0, 0.0, 1.0), tangent);
+    fill.extend(
+        &mut mesh.tangents,
+        &part.tangents,
+        Vec4::new(1.0, 0.0, 0.0, 1.0),
+        tangent,
+    );
     fill.extend(&mut mesh.colors, &part.colors, Vec4::ONE, |color| color);
 }
 

@@ -39,7 +39,6 @@ const MAX_COPIED_TRIANGLES: usize = 20_000;
 /// [`SceneError`], naming file, place and remedy.
 pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     let source = Source::open(path)?;
-    census::refuse_required(&source)?;
     let mut parts = SceneParts {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         ..SceneParts::default()
@@ -175,7 +174,9 @@ fn finish_static_mesh(parts: &mut SceneParts) {
             parts.meshes.remove(0);
             parts.instances.iter_mut().for_each(|instance| instance.mesh -= 1);
         }
-        Some(_) => parts.instances.insert(0, Motion::new(glam::DAffine3::IDENTITY).instance(0, 0)),
+        Some(_) => parts
+            .instances
+            .insert(0, Motion::new(glam::DAffine3::IDENTITY).instance(0, 0)),
     }
 }
 
@@ -194,11 +195,15 @@ fn remark(source: &Source, parts: &mut SceneParts) {
         report.warn("the scene has no lights: the image will be black");
     }
     if parts.textures.is_empty() {
-        report.skipped.push("no textures: no texture coordinates, no texture look-ups".into());
+        report
+            .skipped
+            .push("no textures: no texture coordinates, no texture look-ups".into());
     }
     let unused = source.json.images.len().saturating_sub(parts.textures.len());
     if unused > 0 {
-        report.skipped.push(format!("{unused} images that no visible material needs: not decoded"));
+        report
+            .skipped
+            .push(format!("{unused} images that no visible material needs: not decoded"));
     }
     if !parts.textures.is_empty() && parts.meshes.iter().all(|mesh| mesh.tangents.is_empty()) {
         report.skipped.push("no normal maps: no tangents".into());

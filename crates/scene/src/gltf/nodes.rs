@@ -67,7 +67,13 @@ pub(super) fn walk(source: &Source, report: &mut Report) -> Result<Vec<Placed>, 
                 return Err(not_finite(source, index));
             }
             placed.push(Placed { node: index, world });
-            stack.extend(nodes[index].children.iter().rev().map(|&child| (child, world, depth + 1)));
+            stack.extend(
+                nodes[index]
+                    .children
+                    .iter()
+                    .rev()
+                    .map(|&child| (child, world, depth + 1)),
+            );
         }
     }
     Ok(placed)
@@ -86,9 +92,15 @@ pub(super) fn instancing(source: &Source, index: usize, json: &Instancing) -> Re
     let open = |name: &str, shape: &str| {
         let attribute = json.attributes.get(name);
         let what = format!("{} {name}", label(source, index));
-        attribute.map(|&accessor| Accessor::open(source, accessor, &what, &[shape])).transpose()
+        attribute
+            .map(|&accessor| Accessor::open(source, accessor, &what, &[shape]))
+            .transpose()
     };
-    let streams = [open("TRANSLATION", "VEC3")?, open("ROTATION", "VEC4")?, open("SCALE", "VEC3")?];
+    let streams = [
+        open("TRANSLATION", "VEC3")?,
+        open("ROTATION", "VEC4")?,
+        open("SCALE", "VEC3")?,
+    ];
     let mut counts = streams.iter().flatten().map(Accessor::len);
     let Some(count) = counts.next() else {
         return Ok(vec![DAffine3::IDENTITY]);
@@ -110,7 +122,11 @@ pub(super) fn instancing(source: &Source, index: usize, json: &Instancing) -> Re
                 ..Node::default()
             };
             let (affine, _) = compose(&node);
-            if affine.is_finite() { Ok(affine) } else { Err(not_finite(source, index)) }
+            if affine.is_finite() {
+                Ok(affine)
+            } else {
+                Err(not_finite(source, index))
+            }
         })
         .collect()
 }
@@ -206,7 +222,10 @@ fn compose(node: &Node) -> (DAffine3, Option<&'static str>) {
         Some(q) => {
             let q = DQuat::from_array(q.map(f64::from));
             match q.length_squared() {
-                0.0 => (DQuat::IDENTITY, Some("its rotation is a zero quaternion, taken as none")),
+                0.0 => (
+                    DQuat::IDENTITY,
+                    Some("its rotation is a zero quaternion, taken as none"),
+                ),
                 // Quantised and rounded quaternions are common; glTF asks for unit ones.
                 _ => (q * q.length_recip(), None),
             }

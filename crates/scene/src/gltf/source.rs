@@ -12,8 +12,9 @@ pub(super) struct Source {
     path: PathBuf,
     /// The JSON.
     pub(super) json: Root,
-    /// One entry per buffer of the JSON, each exactly `byteLength` long.
-    buffers: Vec<Vec<u8>>,
+    /// One entry per buffer of the JSON, each exactly `byteLength` long; `None` for one whose bytes come from nowhere,
+    /// which is no error until something reads it.
+    buffers: Vec<Option<Vec<u8>>>,
     /// Bytes read so far: what the sizes of everything made from the file are measured by.
     pub(super) bytes: u64,
 }
@@ -22,7 +23,8 @@ impl Source {
     /// Reads `path` and its buffers.
     ///
     /// # Errors
-    /// [`SceneError::Read`] for a missing file or buffer, [`SceneError::Invalid`] for what is not glTF 2.0.
+    /// [`SceneError::Read`] for a missing file or buffer, [`SceneError::Invalid`] for what is not glTF 2.0 or requires an
+    /// unsupported extension.
     pub(super) fn open(path: &Path) -> Result<Self, SceneError> {
         let file = read_file(path, path, "scene")?;
         let bytes = file.len() as u64;
@@ -44,6 +46,8 @@ impl Source {
             bytes,
         };
         source.check_version()?;
+        // First, because extensions for compression leave buffers out.
+        super::census::refuse_required(&source)?;
         source.read_buffers(blob)?;
         Ok(source)
     }
@@ -77,6 +81,13 @@ impl Source {
             .buffers
             .get(view.buffer)
             .ok_or_else(|| self.no_such(format!("bufferView {index}"), "buffer", view.buffer, self.buffers.len()))?;
+        let Some(buffer) = buffer else {
+            return Err(self.invalid(
+                format!("buffer {}", view.buffer),
+                "has no URI, and there is no binary chunk for it",
+                "export the file again, with its buffers",
+            ));
+        };
         let range = usize::try_from(view.byte_offset)
             .ok()
             .zip(usize::try_from(view.byte_length).ok())
@@ -146,14 +157,9 @@ impl Source {
             let mut data = match (&buffer.uri, index, blob) {
                 (Some(uri), _, _) => self.resolve(uri, &place)?,
                 (None, 0, Some(blob)) => blob.to_vec(),
-                // An empty scene written by some exporters has a buffer of nothing.
-                (None, _, _) if buffer.byte_length == 0 => Vec::new(),
                 (None, _, _) => {
-                    return Err(self.invalid(
-                        place,
-                        "has no URI, and there is no binary chunk for it",
-                        "export the file again, with its buffers",
-                    ));
+                    self.buffers.push(None);
+                    continue;
                 }
             };
             if (data.len() as u64) < buffer.byte_length {
@@ -167,18 +173,13 @@ impl Source {
                 self.bytes += data.len() as u64;
             }
             data.truncate(buffer.byte_length as usize);
-            self.buffers.push(data);
+            self.buffers.push(Some(data));
         }
         Ok(())
     }
 }
 
-fn invalid(
-    path: &Path,
-    place: impl Into<String>,
-    problem: impl Into<String>,
-    remedy: impl Into<String>,
-) -> SceneError {
+fn invalid(path: &Path, place: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> SceneError {
     SceneError::Invalid {
         path: path.into(),
         place: place.into(),
@@ -204,7 +205,9 @@ fn read_file(scene: &Path, file: &Path, what: &str) -> Result<Vec<u8>, SceneErro
         return Err(error(std::io::Error::other("not a regular file")));
     }
     let mut bytes = Vec::new();
-    File::open(file).and_then(|mut f| f.read_to_end(&mut bytes)).map_err(error)?;
+    File::open(file)
+        .and_then(|mut f| f.read_to_end(&mut bytes))
+        .map_err(error)?;
     Ok(bytes)
 }
 
@@ -213,7 +216,14 @@ fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)
     if !file.starts_with(b"glTF") {
         return Ok((file, None));
     }
-    let damaged = |problem: String| invalid(path, "GLB container", problem, "the file is damaged: copy or export it again");
+    let damaged = |problem: String| {
+        invalid(
+            path,
+            "GLB container",
+            problem,
+            "the file is damaged: copy or export it again",
+        )
+    };
     let word = |at: usize| -> Option<u32> {
         let bytes = file.get(at..at + 4)?;
         Some(u32::from_le_bytes(bytes.try_into().expect("four bytes")))
@@ -230,13 +240,19 @@ fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)
         ));
     }
     if length as usize > file.len() {
-        return Err(damaged(format!("claims {length} bytes, but the file has {}", file.len())));
+        return Err(damaged(format!(
+            "claims {length} bytes, but the file has {}",
+            file.len()
+        )));
     }
     let (mut at, mut json, mut blob) = (12, None, None);
     while let (Some(size), Some(kind)) = (word(at), word(at + 4)) {
         let start = at + 8;
         let chunk = file.get(start..start + size as usize).ok_or_else(|| {
-            damaged(format!("a chunk claims {size} bytes at {start}, but the file has {}", file.len()))
+            damaged(format!(
+                "a chunk claims {size} bytes at {start}, but the file has {}",
+                file.len()
+            ))
         })?;
         match &kind.to_le_bytes() {
             b"JSON" if json.is_none() => json = Some(chunk),
