@@ -1,7 +1,17 @@
 //! Image files: EXR (linear float32, layers, metadata), PNG (tone-mapped, for people).
 
 use crate::{Image, RenderError};
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Blocks, Compression, Encoding, FlatSamples, Layer, LayerAttributes,
+    LineOrder, ReadChannels, ReadLayers, SmallVec, Text, WritableImage,
+};
+use glam::Vec3;
+use image::ImageEncoder;
+use scene::luminance;
+use std::io::{BufReader, BufWriter, Write};
 use std::path::Path;
+
+mod display;
 
 /// One channel of an EXR file: dotted name ("R", "albedo.R", "depth.Z") and `width * height` values.
 #[derive(Clone, Debug)]
@@ -12,7 +22,19 @@ pub struct Channel {
     pub values: Vec<f32>,
 }
 
+impl Channel {
+    /// The three channels of an image: `layer.R`, `layer.G`, `layer.B`, or `R`, `G`, `B` if `layer` is empty.
+    pub fn rgb(layer: &str, image: &Image) -> [Self; 3] {
+        let dot = if layer.is_empty() { "" } else { "." };
+        [(0, "R"), (1, "G"), (2, "B")].map(|(c, suffix)| Self {
+            name: format!("{layer}{dot}{suffix}"),
+            values: image.pixels.iter().map(|p| p[c]).collect(),
+        })
+    }
+}
+
 /// Writes a float32 scanline EXR (ZIP) with `channels` and text attributes `metadata`; beside the target first, then renamed.
+/// Characters that EXR text cannot hold (beyond Latin-1) become '?'.
 ///
 /// # Errors
 /// [`RenderError::Write`].
@@ -23,17 +45,92 @@ pub fn write_exr(
     channels: &[Channel],
     metadata: &[(String, String)],
 ) -> Result<(), RenderError> {
-    let _ = (path, width, height, channels, metadata);
-    unimplemented!("owner: render")
+    let pixels = width as usize * height as usize;
+    if let Some(odd) = channels.iter().find(|c| c.values.len() != pixels) {
+        let reason = format!(
+            "channel '{}' has {} values for {pixels} pixels",
+            odd.name,
+            odd.values.len()
+        );
+        return Err(write_error(path, reason));
+    }
+    if pixels == 0 || channels.is_empty() {
+        return Err(write_error(path, "no pixels"));
+    }
+    let list = channels
+        .iter()
+        .map(|c| AnyChannel::new(text(&c.name), FlatSamples::F32(c.values.clone())));
+    let mut attributes = LayerAttributes::default();
+    attributes.software_name = Some(text(concat!("manylight ", env!("CARGO_PKG_VERSION"))));
+    for (name, value) in metadata {
+        attributes.other.insert(text(name), AttributeValue::Text(text(value)));
+    }
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let layer = Layer::new(
+        (width as usize, height as usize),
+        attributes,
+        encoding,
+        AnyChannels::sort(list.collect::<SmallVec<[_; 4]>>()),
+    );
+    write_beside(path, |file| {
+        let image = exr::image::Image::from_layer(layer);
+        // The writer seeks back to its offset table, which a BufWriter allows.
+        image
+            .write()
+            .non_parallel()
+            .to_buffered(BufWriter::new(file))
+            .map_err(|e| e.to_string())
+    })
 }
 
-/// Reads the R, G, B channels of an EXR (or Y alone as grey).
+/// Reads the R, G, B channels of an EXR (or Y alone as grey), half or float; everything else in the file is ignored.
 ///
 /// # Errors
 /// [`RenderError::Read`].
 pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
-    let _ = path;
-    unimplemented!("owner: render")
+    let error = |reason: String| RenderError::Read {
+        path: path.into(),
+        reason,
+    };
+    let file = std::fs::File::open(path).map_err(|e| error(e.to_string()))?;
+    let parts = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(BufReader::new(file))
+        .map_err(|e| error(format!("not a readable EXR: {e}")))?;
+    for part in &parts.layer_data {
+        let channel = |name: &str| part.channel_data.list.iter().find(|c| c.name.eq(name));
+        let found = match (channel("R"), channel("G"), channel("B"), channel("Y")) {
+            (Some(r), Some(g), Some(b), _) => [r, g, b],
+            (_, _, _, Some(y)) => [y, y, y],
+            _ => continue,
+        };
+        let [r, g, b] = found.map(|c| c.sample_data.values_as_f32());
+        let size = |n: usize| u32::try_from(n).map_err(|_| error("larger than 2^32 pixels across".into()));
+        return Ok(Image {
+            width: size(part.size.width())?,
+            height: size(part.size.height())?,
+            pixels: r.zip(g).zip(b).map(|((r, g), b)| [r, g, b]).collect(),
+        });
+    }
+    let names: Vec<String> = parts
+        .layer_data
+        .iter()
+        .flat_map(|p| &p.channel_data.list)
+        .map(|c| c.name.to_string())
+        .collect();
+    let names = names.join(", ");
+    Err(error(format!(
+        "no channels R, G, B and no Y; it has: {names}; export the beauty pass as RGB"
+    )))
 }
 
 /// Writes an sRGB PNG of `image` x 2^`exposure` through the display tone curve; beside the target first, then renamed.
@@ -41,12 +138,87 @@ pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
 /// # Errors
 /// [`RenderError::Write`].
 pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), RenderError> {
-    let _ = (path, image, exposure);
-    unimplemented!("owner: render")
+    let scale = exposure.exp2();
+    write_pixels(path, image, |pixel| display::tone_mapped(pixel * scale))
 }
 
-/// The exposure, in stops, that brings an image's mean to a pleasant level: for PNGs when none is asked for.
-pub fn auto_exposure(image: &Image) -> f32 {
-    let _ = image;
-    unimplemented!("owner: render")
+/// Writes an sRGB PNG of values in \[0, 1\] without a tone curve: for false colours. Beside the target first, then renamed.
+///
+/// # Errors
+/// [`RenderError::Write`].
+pub fn write_png_as_is(path: &Path, image: &Image) -> Result<(), RenderError> {
+    write_pixels(path, image, |pixel| pixel.to_array().map(display::srgb8))
 }
+
+/// The exposure, in stops, that brings an image to a pleasant level: for PNGs when none is asked for. 0 for a black image.
+///
+/// The geometric mean of the luminances becomes mid-grey (Reinhard et al. 2002, section 3.1). Differs: black pixels
+/// (no geometry) do not count, and luminances are first cut to within 6 stops of their median, so that neither a few
+/// lamps nor deep shadow decide.
+pub fn auto_exposure(image: &Image) -> f32 {
+    const KEY: f32 = 0.2;
+    const STOPS_FROM_MEDIAN: f32 = 6.0;
+    let stops = image.pixels.iter().map(|p| luminance(Vec3::from(*p)).log2());
+    let mut stops: Vec<f32> = stops.filter(|s| s.is_finite()).collect();
+    if stops.is_empty() {
+        return 0.0;
+    }
+    let middle = stops.len() / 2;
+    let median = *stops.select_nth_unstable_by(middle, f32::total_cmp).1;
+    let cut = |s: &f32| f64::from(s.clamp(median - STOPS_FROM_MEDIAN, median + STOPS_FROM_MEDIAN));
+    let mean = stops.iter().map(cut).sum::<f64>() / stops.len() as f64;
+    KEY.log2() - mean as f32
+}
+
+fn write_pixels(path: &Path, image: &Image, encode: impl Fn(Vec3) -> [u8; 3]) -> Result<(), RenderError> {
+    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| encode(Vec3::from(*p))).collect();
+    write_beside(path, |file| {
+        let mut out = BufWriter::new(file);
+        let encoder = image::codecs::png::PngEncoder::new(&mut out);
+        encoder
+            .write_image(&bytes, image.width, image.height, image::ExtendedColorType::Rgb8)
+            .map_err(|e| e.to_string())?;
+        out.flush().map_err(|e| e.to_string())
+    })
+}
+
+/// Writes to a temporary file in the target's folder and renames it: readers see the whole file or the old one, and a
+/// failure leaves nothing behind.
+fn write_beside(path: &Path, write: impl FnOnce(&mut std::fs::File) -> Result<(), String>) -> Result<(), RenderError> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if path.is_dir() {
+        return Err(write_error(path, "it is a folder"));
+    }
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    {
+        // What an ordinary new file gets, less the umask; temporary files would be readable by their owner only.
+        use std::os::unix::fs::PermissionsExt;
+        builder.permissions(std::fs::Permissions::from_mode(0o666));
+    }
+    let mut file = builder
+        .tempfile_in(folder)
+        .map_err(|e| write_error(path, e.to_string()))?;
+    write(file.as_file_mut()).map_err(|reason| write_error(path, reason))?;
+    file.persist(path).map_err(|e| write_error(path, e.error.to_string()))?;
+    Ok(())
+}
+
+fn write_error(path: &Path, reason: impl Into<String>) -> RenderError {
+    RenderError::Write {
+        path: path.into(),
+        reason: reason.into(),
+    }
+}
+
+/// EXR text holds Latin-1 only.
+fn text(from: &str) -> Text {
+    let latin: String = from.chars().map(|c| if u32::from(c) < 256 { c } else { '?' }).collect();
+    Text::new_or_none(&latin).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests;

@@ -6,11 +6,15 @@
 //!
 //! Absent from this crate: windows, the command line. Deterministic for a seed at any thread count.
 
+mod direct;
 pub mod error;
+mod exact;
 pub mod film;
+mod filter;
 pub mod frame;
 pub mod image;
 pub mod metric;
+mod path;
 pub mod settings;
 
 pub use error::RenderError;

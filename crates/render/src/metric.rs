@@ -1,6 +1,15 @@
 //! How far an image is from its reference.
 
 use crate::Image;
+use glam::Vec3;
+use scene::luminance;
+
+/// Share of the worst pixels that the trimmed error leaves out: fireflies, which plain relMSE is ruled by.
+const TRIMMED_SHARE: f64 = 0.001;
+
+/// Regulariser of relative errors, as a share of the reference's mean (squared): keeps dark pixels from ruling, and
+/// does not depend on the scale of the scene.
+const EPSILON: f64 = 0.01;
 
 /// Errors on luminance over all pixels, as the field reports them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
@@ -13,14 +22,203 @@ pub struct ImageError {
     pub relmse_trimmed: f64,
     /// Symmetric mean absolute percentage error, 2 |x - r| / (|x| + |r| + 0.01 mean(r)).
     pub smape: f64,
-    /// mean(x) / mean(r).
+    /// mean(x) / mean(r); 1 if both are black.
     pub mean_ratio: f64,
 }
 
 impl ImageError {
-    /// Compares `image` with `reference`; `None` if their sizes differ.
+    /// Compares `image` with `reference`; `None` if their sizes differ. A pixel that is not finite in either makes
+    /// every error infinite: such an image has no error worth a number.
     pub fn between(image: &Image, reference: &Image) -> Option<Self> {
-        let _ = (image, reference);
-        unimplemented!("owner: render")
+        let (x, r) = luminances(image, reference)?;
+        if x.is_empty() {
+            return Some(Self {
+                mean_ratio: 1.0,
+                ..Self::default()
+            });
+        }
+        if x.iter().chain(&r).any(|v| !v.is_finite()) {
+            return Some(Self {
+                mse: f64::INFINITY,
+                relmse: f64::INFINITY,
+                relmse_trimmed: f64::INFINITY,
+                smape: f64::INFINITY,
+                mean_ratio: f64::INFINITY,
+            });
+        }
+        let n = x.len() as f64;
+        let mean_x = x.iter().sum::<f64>() / n;
+        let mean_r = r.iter().sum::<f64>() / n;
+        let squared: Vec<f64> = x.iter().zip(&r).map(|(x, r)| (x - r) * (x - r)).collect();
+        let mut relative: Vec<f64> = squared
+            .iter()
+            .zip(&r)
+            .map(|(sq, r)| ratio(*sq, r * r + EPSILON * mean_r * mean_r, 0.0))
+            .collect();
+        let smape = x
+            .iter()
+            .zip(&r)
+            .map(|(x, r)| ratio(2.0 * (x - r).abs(), x.abs() + r.abs() + EPSILON * mean_r.abs(), 0.0))
+            .sum::<f64>();
+        let relmse = relative.iter().sum::<f64>() / n;
+        let kept = x.len() - (n * TRIMMED_SHARE) as usize;
+        if kept < x.len() {
+            relative.select_nth_unstable_by(kept, f64::total_cmp);
+        }
+        Some(Self {
+            mse: squared.iter().sum::<f64>() / n,
+            relmse,
+            relmse_trimmed: relative[..kept].iter().sum::<f64>() / kept as f64,
+            smape: smape / n,
+            mean_ratio: ratio(mean_x, mean_r, 1.0),
+        })
+    }
+}
+
+/// `a / b`; `both_zero` where both are zero.
+fn ratio(a: f64, b: f64, both_zero: f64) -> f64 {
+    if a == 0.0 && b == 0.0 { both_zero } else { a / b }
+}
+
+/// Luminances of two images of one size.
+fn luminances(image: &Image, reference: &Image) -> Option<(Vec<f64>, Vec<f64>)> {
+    let same = (image.width, image.height) == (reference.width, reference.height);
+    let of = |i: &Image| i.pixels.iter().map(|p| f64::from(luminance(Vec3::from(*p)))).collect();
+    same.then(|| (of(image), of(reference)))
+}
+
+/// Where and how `image` differs from `reference`, in false colours for [`crate::image::write_png_as_is`]: black where equal,
+/// through blue to white where too dark, through red to yellow where too bright. The scale is the square root of
+/// |x - r| / (|x| + |r| + 0.01 mean(r)), so that small differences show; magenta marks pixels that are not finite. `None` if the sizes differ.
+pub fn false_color_difference(image: &Image, reference: &Image) -> Option<Image> {
+    let (x, r) = luminances(image, reference)?;
+    let finite = r.iter().filter(|r| r.is_finite());
+    let mean_r = finite.clone().sum::<f64>() / finite.count().max(1) as f64;
+    let color = |(x, r): (&f64, &f64)| {
+        let size = ratio((x - r).abs(), x.abs() + r.abs() + EPSILON * mean_r.abs(), 0.0);
+        if !size.is_finite() {
+            return [1.0, 0.0, 1.0];
+        }
+        let size = size.min(1.0).sqrt() as f32;
+        let (rise, light) = ((2.0 * size).min(1.0), (2.0 * size - 1.0).max(0.0));
+        if x > r {
+            [rise, light, 0.0]
+        } else {
+            [light, light, rise]
+        }
+    };
+    Some(Image {
+        width: image.width,
+        height: image.height,
+        pixels: x.iter().zip(&r).map(color).collect(),
+    })
+}
+
+/// Per pixel, how many standard errors the luminances of two independent images lie apart, (x - y) / sqrt(vx + vy); 0 where both agree
+/// without variance. `None` if sizes differ.
+///
+/// For unbiased images of enough samples these are standard normal.
+pub fn z_scores(x: &Image, variance_x: &[f32], y: &Image, variance_y: &[f32]) -> Option<Vec<f64>> {
+    let (lum_x, lum_y) = luminances(x, y)?;
+    if [variance_x.len(), variance_y.len()] != [lum_x.len(); 2] {
+        return None;
+    }
+    let variances = variance_x.iter().zip(variance_y);
+    let pixels = lum_x.iter().zip(&lum_y).zip(variances);
+    Some(
+        pixels
+            .map(|((x, y), (vx, vy))| ratio(x - y, (f64::from(*vx) + f64::from(*vy)).sqrt(), 0.0))
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn grey(values: &[f32]) -> Image {
+        Image {
+            width: values.len() as u32,
+            height: 1,
+            pixels: values.iter().map(|v| [*v; 3]).collect(),
+        }
+    }
+
+    fn close(a: f64, b: f64) -> bool {
+        (a - b).abs() <= 1e-6 * b.abs().max(1.0)
+    }
+
+    #[test]
+    fn errors_of_a_known_pair() {
+        // mean(r) = 2, so the regulariser is 0.04 for squares and 0.02 for SMAPE.
+        let e = ImageError::between(&grey(&[1.0, 5.0]), &grey(&[1.0, 3.0])).expect("same size");
+        assert!(close(e.mse, 2.0), "{e:?}");
+        assert!(close(e.relmse, 0.5 * 4.0 / 9.04), "{e:?}");
+        assert!(close(e.relmse_trimmed, e.relmse), "{e:?}");
+        assert!(close(e.smape, 0.5 * 4.0 / 8.02), "{e:?}");
+        assert!(close(e.mean_ratio, 1.5), "{e:?}");
+    }
+
+    #[test]
+    fn trimming_leaves_out_the_worst_thousandth() {
+        let reference = vec![1.0; 2000];
+        let mut image = reference.clone();
+        image[7] = 1000.0;
+        image[1999] = 500.0;
+        let e = ImageError::between(&grey(&image), &grey(&reference)).expect("same size");
+        assert!(e.relmse > 100.0 && e.relmse_trimmed < 1e-12, "{e:?}");
+        image[3] = 100.0;
+        let e = ImageError::between(&grey(&image), &grey(&reference)).expect("same size");
+        assert!(e.relmse_trimmed > 1.0, "two of 2,000 are trimmed, not three: {e:?}");
+    }
+
+    #[test]
+    fn relative_errors_ignore_the_scale_of_the_scene() {
+        let (x, r) = ([0.5, 2.0, 0.0, 7.0], [1.0, 1.5, 0.1, 6.0]);
+        let base = ImageError::between(&grey(&x), &grey(&r)).expect("same size");
+        let scaled = |s: f32| ImageError::between(&grey(&x.map(|v| v * s)), &grey(&r.map(|v| v * s)));
+        for s in [1e-6, 1e6] {
+            let e = scaled(s).expect("same size");
+            assert!((e.relmse / base.relmse - 1.0).abs() < 1e-5, "{e:?}");
+            assert!((e.smape / base.smape - 1.0).abs() < 1e-5, "{e:?}");
+        }
+    }
+
+    #[test]
+    fn black_equal_empty_and_unfit_images() {
+        let black = ImageError::between(&grey(&[0.0; 4]), &grey(&[0.0; 4])).expect("same size");
+        assert_eq!(
+            (black.mse, black.relmse, black.smape, black.mean_ratio),
+            (0.0, 0.0, 0.0, 1.0)
+        );
+        assert!(ImageError::between(&grey(&[1.0]), &grey(&[1.0, 1.0])).is_none());
+        let empty = ImageError::between(&grey(&[]), &grey(&[])).expect("same size");
+        assert_eq!(empty.mean_ratio, 1.0);
+        let nan = ImageError::between(&grey(&[f32::NAN]), &grey(&[1.0])).expect("same size");
+        assert_eq!(nan.relmse, f64::INFINITY);
+    }
+
+    #[test]
+    fn false_colours_tell_direction_and_size() {
+        let difference = false_color_difference(&grey(&[1.0, 0.9, 1.1, 9.0, f32::NAN]), &grey(&[1.0; 5]));
+        let p = difference.expect("same size").pixels;
+        assert_eq!(p[0], [0.0; 3]);
+        assert!(p[1][2] > 0.1 && p[1][0] == 0.0, "darker is blue: {:?}", p[1]);
+        assert!(p[2][0] > 0.1 && p[2][2] == 0.0, "brighter is red: {:?}", p[2]);
+        assert!(p[3][1] > p[2][1], "far brighter is yellow: {:?}", p[3]);
+        assert_eq!(p[4], [1.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn z_scores_are_in_standard_errors() {
+        let z = z_scores(
+            &grey(&[3.0, 1.0, 2.0]),
+            &[3.0, 0.0, 0.0],
+            &grey(&[1.0, 1.0, 1.0]),
+            &[1.0, 0.0, 0.0],
+        );
+        let z = z.expect("same size");
+        assert!(close(z[0], 1.0) && z[1] == 0.0 && z[2] == f64::INFINITY, "{z:?}");
+        assert!(z_scores(&grey(&[1.0]), &[], &grey(&[1.0]), &[0.0]).is_none());
     }
 }

@@ -1,0 +1,208 @@
+//! Direct light at a path vertex by drawing one light (next-event estimation).
+
+use crate::path::{Probe, TileLog};
+use glam::{Vec2, Vec3};
+use light_cache::{LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use sampling::{VertexSequence, mis};
+use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
+
+/// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
+const SHADOW_RAY_END: f32 = 1.0 - 1.0 / (1 << 18) as f32;
+
+/// A path vertex that wants direct light.
+pub(crate) struct Vertex<'v> {
+    pub(crate) surface: &'v Surface,
+    pub(crate) wo_ws: Vec3,
+    /// Weight of the path up to here.
+    pub(crate) throughput: Vec3,
+    pub(crate) point: ShadingPoint,
+    /// Whether a direction drawn from the BSDF will also look for lights, so that both must share.
+    pub(crate) competes: bool,
+}
+
+/// An estimate of direct light.
+pub(crate) struct Direct {
+    /// Throughput included.
+    pub(crate) radiance: Vec3,
+    /// The light that was chosen, if one was.
+    pub(crate) light: Option<u32>,
+}
+
+/// A way to estimate direct light: one light chosen by a sampler, or all of them.
+pub(crate) trait DirectLight: Sync + Send {
+    /// What is worked out once per vertex.
+    type Local<'a>
+    where
+        Self: 'a;
+
+    /// Prepares for `point`.
+    fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_>;
+
+    /// The direct light at `vertex`.
+    fn estimate(
+        &self,
+        scene: &Scene,
+        local: &Self::Local<'_>,
+        vertex: &Vertex<'_>,
+        numbers: &VertexSequence,
+        log: &mut TileLog<'_>,
+        probe: &mut impl Probe,
+    ) -> Direct;
+
+    /// The probability with which [`DirectLight::estimate`] looks at `light`.
+    fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
+
+    /// Learns from a frame.
+    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
+
+    /// What a sampler can tell about itself; `None` if there is none.
+    fn sampler_stats(&self) -> Option<SamplerStats>;
+
+    /// What is known about each light.
+    fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+}
+
+/// One light per vertex, chosen by a sampler.
+pub(crate) struct OneLight<S>(pub(crate) S);
+
+impl<S: LightSampler> DirectLight for OneLight<S> {
+    type Local<'a>
+        = S::Local<'a>
+    where
+        Self: 'a;
+
+    #[inline]
+    fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_> {
+        self.0.local(scene, point)
+    }
+
+    #[inline]
+    fn estimate(
+        &self,
+        scene: &Scene,
+        local: &Self::Local<'_>,
+        vertex: &Vertex<'_>,
+        numbers: &VertexSequence,
+        log: &mut TileLog<'_>,
+        probe: &mut impl Probe,
+    ) -> Direct {
+        let Some(choice) = self.0.sample(local, numbers.u32(2)) else {
+            return Direct {
+                radiance: Vec3::ZERO,
+                light: None,
+            };
+        };
+        let connection = Connection::new(scene, vertex, choice.light, choice.pmf, numbers.vec2(3));
+        let visible = connection
+            .as_ref()
+            .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
+        if S::LEARNS {
+            log.observations.push(Observation {
+                point: vertex.point,
+                light: choice.light,
+                unshadowed: connection.as_ref().map_or(0.0, Connection::unshadowed),
+                pmf: choice.pmf,
+                visible,
+            });
+        }
+        Direct {
+            radiance: match connection {
+                Some(connection) if visible => connection.contribution(choice.pmf),
+                _ => Vec3::ZERO,
+            },
+            light: Some(choice.light),
+        }
+    }
+
+    #[inline]
+    fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32 {
+        self.0.pmf(local, light)
+    }
+
+    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
+        self.0.end_frame(scene, logs);
+    }
+
+    fn sampler_stats(&self) -> Option<SamplerStats> {
+        Some(self.0.stats())
+    }
+
+    fn records(&self, scene: &Scene) -> Vec<LightRecord> {
+        self.0.records(scene)
+    }
+}
+
+/// A vertex joined with a point on a light, visibility unknown.
+pub(crate) struct Connection {
+    /// Throughput x BSDF x cosine x radiance / pdf of the point; never black, not yet divided by the light's probability.
+    unweighted: Vec3,
+    /// Multiple-importance weight.
+    weight: f32,
+    /// The weight if the light had been chosen for certain: what is learned must not depend on what was learned.
+    weight_if_certain: f32,
+    shadow_ray: Ray,
+    to: PrimitiveId,
+}
+
+impl Connection {
+    /// Joins `vertex` with the point `u` on `light`, chosen with probability `pmf`; `None` if no light can arrive.
+    #[inline]
+    pub(crate) fn new(scene: &Scene, vertex: &Vertex<'_>, light: u32, pmf: f32, u: Vec2) -> Option<Self> {
+        let surface = vertex.surface;
+        let point = scene.sample_light(light, surface.position_ws, u)?;
+        // Both normals must see the light: the shading normal by `eval`, the geometric one here. Otherwise light leaks
+        // through surfaces, or the two strategies would disagree.
+        if surface.geometric_normal_ws.dot(point.wi_ws) <= 0.0 {
+            return None;
+        }
+        let value = surface.bsdf.eval(vertex.wo_ws, point.wi_ws);
+        let unweighted = vertex.throughput * value * point.radiance / point.pdf_solid_angle;
+        if unweighted == Vec3::ZERO {
+            return None;
+        }
+        let record = &scene.lights[light as usize];
+        let (weight, weight_if_certain) = if vertex.competes && !record.is_delta() {
+            let pdf_bsdf = surface.bsdf.pdf(vertex.wo_ws, point.wi_ws);
+            (
+                mis::power(pmf * point.pdf_solid_angle, pdf_bsdf),
+                mis::power(point.pdf_solid_angle, pdf_bsdf),
+            )
+        } else {
+            (1.0, 1.0)
+        };
+        Some(Self {
+            unweighted,
+            weight,
+            weight_if_certain,
+            shadow_ray: scene.ray_from(surface, point.wi_ws, point.distance * SHADOW_RAY_END),
+            to: record.primitive,
+        })
+    }
+
+    /// What the light adds if it is visible, having been chosen with probability `pmf`.
+    #[inline]
+    pub(crate) fn contribution(&self, pmf: f32) -> Vec3 {
+        self.unweighted * (self.weight / pmf)
+    }
+
+    /// Luminance of what the light would add if nothing stood in the way, the light being chosen for certain.
+    #[inline]
+    fn unshadowed(&self) -> f32 {
+        let y = luminance(self.unweighted) * self.weight_if_certain;
+        if y < f32::INFINITY { y } else { 0.0 }
+    }
+
+    /// Traces the shadow ray.
+    #[inline]
+    pub(crate) fn is_visible(
+        &self,
+        scene: &Scene,
+        vertex: &Vertex<'_>,
+        log: &mut TileLog<'_>,
+        probe: &mut impl Probe,
+    ) -> bool {
+        log.counters.rays_occluded += 1;
+        probe.occluded(&self.shadow_ray, vertex.surface.id, self.to);
+        !scene.occluded(&self.shadow_ray, vertex.surface.id, self.to)
+    }
+}
