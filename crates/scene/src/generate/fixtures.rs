@@ -9,9 +9,9 @@ use super::lamps::{Lamp, Source, share};
 use glam::Vec3;
 
 /// Lamp light, linear RGB of luminance about 1.
-const WARM: Vec3 = Vec3::new(1.45, 0.93, 0.42);
+pub(super) const WARM: Vec3 = Vec3::new(1.45, 0.93, 0.42);
 pub(super) const NEUTRAL: Vec3 = Vec3::new(1.18, 0.98, 0.74);
-const COOL: Vec3 = Vec3::new(0.80, 1.02, 1.36);
+pub(super) const COOL: Vec3 = Vec3::new(0.80, 1.02, 1.36);
 const TINTED: [Vec3; 4] = [
     Vec3::new(1.9, 0.78, 0.25),
     Vec3::new(0.35, 1.15, 1.35),
@@ -53,21 +53,44 @@ impl Shares {
     }
 }
 
+/// Colour and brightness of a room.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mood {
+    pub(super) color: Vec3,
+    /// Mean irradiance on the floor, roughly, W/m^2.
+    pub(super) irradiance: f32,
+}
+
+impl Mood {
+    /// What suits the use of the room, with a tinted one now and then.
+    pub(super) fn draw(dice: &mut Dice, spots: &Spots) -> Self {
+        let (color, irradiance) = match spots.kind {
+            Kind::Hero => (NEUTRAL, 7.0),
+            Kind::Dining if spots.table.is_some() => (WARM, dice.range(6.0, 8.0)),
+            Kind::Gallery => (COOL, 11.0),
+            _ if dice.chance(0.15) => (dice.pick(&TINTED), dice.range(3.0, 6.0)),
+            _ => (dice.pick(&[WARM, WARM, NEUTRAL, COOL]), dice.range(2.0, 9.0)),
+        };
+        Self { color, irradiance }
+    }
+}
+
 /// Hangs the lamps of one room: exactly `lights` lights.
-pub(super) fn light(b: &mut Builder, dice: &mut Dice, p: &Palette, spots: &Spots, lights: usize, source: Source) {
+pub(super) fn light(
+    b: &mut Builder,
+    dice: &mut Dice,
+    p: &Palette,
+    spots: &Spots,
+    mood: Mood,
+    lights: usize,
+    source: Source,
+) {
     b.place_in_world();
     let size = spots.room.size();
-    let (color, irradiance) = match spots.kind {
-        Kind::Hero => (NEUTRAL, 7.0),
-        Kind::Dining if spots.table.is_some() => (WARM, dice.range(6.0, 8.0)),
-        Kind::Gallery => (COOL, 11.0),
-        _ if dice.chance(0.15) => (dice.pick(&TINTED), dice.range(3.0, 6.0)),
-        _ => (dice.pick(&[WARM, WARM, NEUTRAL, COOL]), dice.range(2.0, 9.0)),
-    };
     let shares = Shares::new(spots, lights);
-    // Flux that gives about this mean irradiance on the floor; the rest falls on walls and furniture.
-    let flux = irradiance * size.x * size.y / 0.55;
-    ceiling_lamps(b, dice, p, spots, shares.ceiling, color * (flux * 0.6), source);
+    // About half of the flux falls on walls and furniture.
+    let flux = mood.irradiance * size.x * size.y / 0.55;
+    ceiling_lamps(b, dice, p, spots, shares.ceiling, mood.color * (flux * 0.6), source);
     if let (Some(table), 1..) = (spots.table, shares.pendants) {
         pendants(b, dice, p, spots, table, shares.pendants, WARM * (flux * 0.06), source);
     }

@@ -9,11 +9,13 @@ mod dice;
 mod fixtures;
 mod furnish;
 mod furniture;
+mod keyhole;
 mod lamps;
 mod one_light;
 mod plaza;
 mod plaza_town;
 mod rooms;
+mod spheres;
 
 use crate::{SceneError, SceneParts};
 use lamps::Source;
@@ -53,6 +55,18 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 2048,
         make: rooms::sun_outside,
+    },
+    Family {
+        name: "keyhole",
+        lights: MANY,
+        default: 1024,
+        make: keyhole::keyhole,
+    },
+    Family {
+        name: "spheres",
+        lights: MANY,
+        default: 1024,
+        make: spheres::spheres,
     },
     Family {
         name: "one-light",

@@ -94,7 +94,7 @@ pub(super) fn plaza(lights: usize, seed: u32) -> SceneParts {
     }
     people(&mut b, &mut Dice::new(&[seed, 26]), &p);
     b.place_in_world();
-    b.camera("square", Vec3::new(-13.2, 2.7, 13.6), Vec3::new(0.6, 2.25, -1.0), 0.92);
+    b.camera("square", Vec3::new(-11.2, 4.1, 12.6), Vec3::new(1.2, 1.9, -2.0), 0.92);
     b.camera("fountain", Vec3::new(7.5, 1.65, 6.5), Vec3::new(-2.0, 2.1, -2.5), 0.95);
     b.finish()
 }

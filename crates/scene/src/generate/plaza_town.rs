@@ -11,10 +11,10 @@ pub(super) const FRONT: [f32; 2] = [18.0, 15.0];
 
 /// Lamp posts, (x, z), the ones that the camera sees best first.
 pub(super) const LANTERNS: [[f32; 2]; 12] = [
-    [-3.9, 3.4],
-    [3.9, -3.4],
-    [3.9, 3.4],
-    [-3.9, -3.4],
+    [5.3, -1.2],
+    [-5.3, 1.2],
+    [1.2, -4.9],
+    [-1.2, 4.9],
     [-11.0, -8.6],
     [11.0, -8.6],
     [11.0, 8.6],

@@ -3,7 +3,7 @@
 use super::builder::Builder;
 use super::building::{Opening, Plan, Room, STOREY_HEIGHT, Shell, Side};
 use super::dice::Dice;
-use super::fixtures::light;
+use super::fixtures::{Mood, light};
 use super::furnish::{Kind, furnish};
 use super::furniture::Palette;
 use super::lamps::{Source, share};
@@ -81,7 +81,8 @@ fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Vec3 {
         };
         let spots = furnish(b, &mut dice, &palette, room, index, kind);
         let lights = share(lights, plan.rooms.len(), index);
-        light(b, &mut dice, &palette, &spots, lights, source);
+        let mood = Mood::draw(&mut dice, &spots);
+        light(b, &mut dice, &palette, &spots, mood, lights, source);
     }
     b.place_in_world();
     let room = &plan.rooms[hero];
