@@ -114,8 +114,7 @@ impl Tile {
     #[inline]
     pub(crate) fn add(&mut self, index: usize, radiance: Vec3) -> bool {
         let size = radiance.x.abs() + radiance.y.abs() + radiance.z.abs();
-        // Written so that NaN fails too.
-        if !(size < LARGEST) {
+        if size.is_nan() || size >= LARGEST {
             return false;
         }
         let y = luminance(radiance);

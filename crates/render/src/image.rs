@@ -60,8 +60,10 @@ pub fn write_exr(
     let list = channels
         .iter()
         .map(|c| AnyChannel::new(text(&c.name), FlatSamples::F32(c.values.clone())));
-    let mut attributes = LayerAttributes::default();
-    attributes.software_name = Some(text(concat!("manylight ", env!("CARGO_PKG_VERSION"))));
+    let mut attributes = LayerAttributes {
+        software_name: Some(text(concat!("manylight ", env!("CARGO_PKG_VERSION")))),
+        ..LayerAttributes::default()
+    };
     for (name, value) in metadata {
         attributes.other.insert(text(name), AttributeValue::Text(text(value)));
     }

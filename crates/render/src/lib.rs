@@ -15,6 +15,7 @@ pub mod frame;
 pub mod image;
 pub mod metric;
 mod path;
+pub mod rays;
 pub mod settings;
 
 pub use error::RenderError;

@@ -153,7 +153,8 @@ mod tests {
     #[test]
     fn settings_out_of_range_are_refused_with_the_range() {
         Settings::default().check().expect("the default is valid");
-        let odd: [(&str, fn(&mut Settings)); 7] = [
+        type Spoil = fn(&mut Settings);
+        let odd: [(&str, Spoil); 7] = [
             ("0 x 720", |s| s.width = 0),
             ("1280 x 40000", |s| s.height = 40_000),
             ("min_probability_mass", |s| s.light.min_probability_mass = 1.5),

@@ -1,0 +1,59 @@
+//! The rays of a rendering, written down: to measure what ray tracing alone costs.
+
+use crate::Settings;
+use crate::direct::OneLight;
+use crate::filter::FilterSampler;
+use crate::path::{Counters, FrameView, Probe, TileLog, path};
+use glam::Vec2;
+use light_cache::UniformSampler;
+use sampling::PixelSequence;
+use scene::{Camera, PrimitiveId, Ray, Scene};
+
+/// Rays in the order in which a rendering traces them.
+#[derive(Clone, Debug, Default)]
+pub struct TracedRays {
+    /// Rays for the nearest hit, and the triangle each one leaves.
+    pub nearest: Vec<(Ray, PrimitiveId)>,
+    /// Shadow rays, the triangle each one leaves and the one it aims at.
+    pub occluded: Vec<(Ray, PrimitiveId, PrimitiveId)>,
+}
+
+impl Probe for TracedRays {
+    fn nearest(&mut self, ray: &Ray, from: PrimitiveId) {
+        self.nearest.push((*ray, from));
+    }
+
+    fn occluded(&mut self, ray: &Ray, from: PrimitiveId, to: PrimitiveId) {
+        self.occluded.push((*ray, from, to));
+    }
+}
+
+/// All rays of frame number `frame` with the sampler `uniform`, whatever `settings.method` says.
+pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: u32) -> TracedRays {
+    let view = FrameView {
+        scene,
+        direct: &OneLight(UniformSampler::new(&scene.lights)),
+        camera: camera.rays(settings.width, settings.height),
+        filter: &FilterSampler::new(settings.pixel_filter),
+        image_width: settings.width,
+        max_bounces: settings.max_bounces,
+        seed: settings.seed,
+        frame,
+        area_lights: scene.lights.iter().any(|light| !light.is_delta()),
+    };
+    let mut rays = TracedRays::default();
+    let mut film = crate::Film::new(settings.width, settings.height, false);
+    let mut log = TileLog {
+        observations: &mut Vec::new(),
+        counters: Counters::default(),
+    };
+    for tile in film.tiles_mut() {
+        for y in tile.y0..tile.y0 + tile.height {
+            for x in tile.x0..tile.x0 + tile.width {
+                let sequence = PixelSequence::new(settings.seed, y * settings.width + x, frame);
+                path(&view, Vec2::new(x as f32, y as f32), &sequence, &mut log, &mut rays);
+            }
+        }
+    }
+    rays
+}
