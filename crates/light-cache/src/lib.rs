@@ -8,6 +8,7 @@
 //! Absent from this crate: GPU handles, windows, files, ray tracing. Deterministic for a seed at any thread count:
 //! logs are merged in the order of the image's tiles.
 
+mod belief;
 mod dispatch;
 mod octree;
 mod power;

@@ -211,17 +211,17 @@ mod tests {
             let scene = scene_of(mixed_lights(count, 3));
             let sampler = OctreeSampler::new(&scene, &Settings::default());
             check(&sampler, &scene, &points(24, 5));
-            check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+            check_each_light_is_drawn(&sampler, &scene);
         }
     }
 
     #[test]
     fn a_light_in_the_cell_is_bright() {
         let mut lights: Vec<Light> = (0..1000).map(|i| point(Vec3::new(i as f32, 0.0, 0.0), 1.0)).collect();
-        lights[500].power *= 1e-3;
+        lights[510].power *= 1e-3;
         let sampler = OctreeSampler::over(&lights, Vec3::new(500.0, 0.0, 0.0), 500.0, &Settings::default());
-        let cell = sampler.cell(Vec3::new(500.0, 0.0, 0.0));
-        assert!(cell.mass(500) > cell.mass(530) && cell.mass(530) > 0);
+        let cell = sampler.cell(Vec3::new(510.0, 1.0, 1.0));
+        assert!(cell.mass(510) > cell.mass(540) && cell.mass(540) > 0);
         assert_eq!(cell.mass(0), 0, "far lights are left to the rest");
         assert_eq!(sampler.stats().cells, 1);
     }

@@ -161,12 +161,19 @@ pub(crate) fn check<S: LightSampler>(sampler: &S, scene: &Scene, points: &[Shadi
 
 /// With stratified random numbers every light comes up as often as its probability says: the sum of 1 / (pmf n) over its draws is near 1
 /// (finds lights that are never drawn; after pbrt-v4's test of its light samplers).
-pub(crate) fn check_each_light_is_drawn<S: LightSampler>(sampler: &S, scene: &Scene, point: &ShadingPoint) {
-    let local = sampler.local(scene, point);
+pub(crate) fn check_each_light_is_drawn<S: LightSampler>(sampler: &S, scene: &Scene) {
+    let points = points(64, 6);
+    let locals = points.iter().map(|point| sampler.local(scene, point));
+    let local = locals
+        .into_iter()
+        .find(|local| sampler.sample(local, 0).is_some())
+        .expect("some point is lit");
     let draws = 1_u32 << 18;
     let mut sums = vec![0.0; scene.lights.len()];
     for draw in 0..draws {
-        let choice = sampler.sample(&local, draw << 14 | 0x1fff).expect("the point is lit");
+        let choice = sampler
+            .sample(&local, draw << 14 | 0x1fff)
+            .expect("a lit point always has a light");
         sums[choice.light as usize] += 1.0 / (f64::from(choice.pmf) * f64::from(draws));
     }
     for (light, sum) in sums.iter().enumerate() {

@@ -166,7 +166,7 @@ mod tests {
                 sampler.end_frame(&scene, &logs);
             }
             check(&sampler, &scene, &points(16, 5));
-            check_each_light_is_drawn(&sampler, &scene, &points(1, 6)[0]);
+            check_each_light_is_drawn(&sampler, &scene);
         }
     }
 
@@ -189,7 +189,8 @@ mod tests {
             sampler.end_frame(&scene, &logs);
         }
         let after = share(&sampler);
-        assert!(before < 0.3 && after > 0.85, "{before} {after}");
+        // Where no visible light shines, hidden ones are all that is left.
+        assert!(before < 0.1 && after > 0.5, "{before} {after}");
     }
 
     #[test]
@@ -198,13 +199,14 @@ mod tests {
         lights[8].intensity *= 1e6;
         let scene = scene_of(lights);
         let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
-        assert!(sampler.records(&scene)[8].probability > 0.9);
+        let before = sampler.records(&scene)[8].probability;
         for frame in 0..8 {
             let logs = observe(&sampler, &scene, frame, |light| light != 8);
             sampler.end_frame(&scene, &logs);
         }
         let giant = sampler.records(&scene)[8];
-        assert!(giant.probability < 0.1, "{giant:?}");
+        // Half of all points turn away from it.
+        assert!(before > 0.4 && giant.probability < 0.05, "{before} {giant:?}");
         assert_eq!(giant.visible_fraction, 0.0);
     }
 

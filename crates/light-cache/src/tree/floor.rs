@@ -68,7 +68,7 @@ mod tests {
     fn every_light_owns_the_same_numbers() {
         for count in [1, 3, 1000, 1_000_000] {
             let floor = Floor::new(0.005, count);
-            assert!(floor.probability() * count as f64 >= 0.005);
+            assert!(floor.probability() * count as f64 >= f64::from(0.005_f32));
             assert_eq!(floor.draw(0), Some(0));
             assert_eq!(floor.draw(floor.total - 1), Some(count as u32 - 1));
             assert_eq!(floor.draw(floor.total), None);

@@ -1,6 +1,7 @@
 //! How much of each light reaches the image, learned from shadow rays.
 
 use crate::Observation;
+use crate::belief::chance_visible;
 use crate::tree::{LEAF, Tree};
 
 /// Pseudo-samples of the prior. Higher values believe neighbours longer; lower values believe few shadow rays.
@@ -178,12 +179,10 @@ impl Visibility {
 /// By what a light's strength is multiplied.
 fn light_factor(seen: &Seen, prior: f32) -> f32 {
     let share = seen.evidence.share(prior);
-    // Never seen in many samples: more likely hidden altogether than barely visible. With an even chance of either
-    // and all visible shares alike, the chance that it is visible at all is 1 / (1 + samples).
     let alive = if seen.evidence.visible > 0.0 {
         1.0
     } else {
-        1.0 / (1.0 + 0.25 * seen.evidence.samples)
+        chance_visible(seen.evidence.samples)
     };
     (share * alive).max(MIN_VISIBLE).sqrt()
 }
