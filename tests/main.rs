@@ -1,1 +1,10 @@
-fn main() {}
+//! The cross-crate tests, one binary.
+
+/// Scenes whose image is known in closed form.
+mod closed_form;
+/// What must hold for any scene: invariances, degenerate inputs, threads, probabilities.
+mod properties;
+/// A million lights.
+mod scale;
+/// Every sampler against `exact`.
+mod unbiased;

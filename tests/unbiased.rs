@@ -1,0 +1,91 @@
+//! Every sampler against `exact`, which sums over all lights and uses no cache: direct light and four bounces, on every
+//! family of generated scenes. Learning samplers learn from nothing within each repetition, so that the frames in which
+//! they change are part of what is compared.
+
+use light_cache::SamplerKind;
+use render::Method;
+use tests::compare::{Plan, assert_same, estimate, sampled};
+use tests::scenes::{still_life, still_life_camera};
+
+const WIDTH: u32 = 32;
+const HEIGHT: u32 = 24;
+
+/// Seeds of the reference lie apart from those of the samplers.
+const REFERENCE_SEED: u64 = 1 << 32;
+
+fn check_scene(name: &str, scene: &scene::Scene, camera: &scene::Camera) {
+    for bounces in [0, 4] {
+        let reference = Plan::new(Method::Exact, WIDTH, HEIGHT)
+            .bounces(bounces)
+            .effort(4, 16)
+            .seed(REFERENCE_SEED);
+        let reference = estimate(scene, camera, &reference);
+        assert!(reference.mean.mean() > 0.0, "{name}: the view is black");
+        for kind in SamplerKind::ALL {
+            let plan = Plan::new(sampled(kind), WIDTH, HEIGHT).bounces(bounces).effort(16, 24);
+            let what = format!("{name}, {bounces} bounces, {}", kind.name());
+            assert_same(&what, &estimate(scene, camera, &plan), &reference);
+        }
+    }
+}
+
+fn check_demo(name: &str) {
+    let scene = scene::load(&format!("demo:{name}")).expect("the scene is known");
+    check_scene(name, &scene, &scene.parts.cameras[0]);
+}
+
+#[test]
+fn every_family_is_tested() {
+    let tested = [
+        "rooms",
+        "points",
+        "sun-outside",
+        "plaza",
+        "keyhole",
+        "spheres",
+        "one-light",
+    ];
+    for name in scene::generate::names() {
+        assert!(tested.contains(&name), "no unbiasedness test for demo:{name}");
+    }
+}
+
+#[test]
+fn rooms() {
+    check_demo("rooms:64");
+}
+
+#[test]
+fn points() {
+    check_demo("points:64");
+}
+
+#[test]
+fn sun_outside() {
+    check_demo("sun-outside:64");
+}
+
+#[test]
+fn plaza() {
+    check_demo("plaza:64");
+}
+
+#[test]
+fn keyhole() {
+    check_demo("keyhole:64");
+}
+
+#[test]
+fn spheres() {
+    check_demo("spheres:64");
+}
+
+#[test]
+fn one_light() {
+    check_demo("one-light");
+}
+
+#[test]
+fn lights_of_every_kind() {
+    check_scene("still life", &still_life(1.0).build(), &still_life_camera(1.0));
+}
