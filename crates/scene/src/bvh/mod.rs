@@ -168,11 +168,11 @@ impl Bvh {
         // SAFETY: `kernel` is one that this processor has.
         unsafe {
             match self.kernel {
-                Kernel::Portable => nearest_portable(&query),
+                Kernel::Portable => portable::nearest(&query),
                 #[cfg(target_arch = "x86_64")]
-                Kernel::Avx2 => nearest_avx2(&query),
+                Kernel::Avx2 => avx2::nearest(&query),
                 #[cfg(target_arch = "x86_64")]
-                Kernel::Avx512 => nearest_avx512(&query),
+                Kernel::Avx512 => avx512::nearest(&query),
             }
         }
     }
@@ -189,11 +189,11 @@ impl Bvh {
         // SAFETY: `kernel` is one that this processor has.
         unsafe {
             match self.kernel {
-                Kernel::Portable => occluded_portable(&query),
+                Kernel::Portable => portable::occluded(&query),
                 #[cfg(target_arch = "x86_64")]
-                Kernel::Avx2 => occluded_avx2(&query),
+                Kernel::Avx2 => avx2::occluded(&query),
                 #[cfg(target_arch = "x86_64")]
-                Kernel::Avx512 => occluded_avx512(&query),
+                Kernel::Avx512 => avx512::occluded(&query),
             }
         }
     }
@@ -212,32 +212,60 @@ impl Bvh {
     }
 }
 
-/// Compiles both queries for an instruction set.
+/// Compiles both queries for an instruction set. Instances are rare enough to be kept out of the way.
 macro_rules! compile {
-    ($nearest:ident, $occluded:ident, $instructions:ty $(, $features:literal)?) => {
-        $(#[target_feature(enable = $features)])?
+    ($module:ident, $instructions:ty $(, $features:literal)?) => {
         #[allow(unsafe_code, reason = "vector instructions")]
-        unsafe fn $nearest(query: &Query<'_>) -> Option<Hit> {
-            // SAFETY: the caller knows that the processor has the instructions.
-            unsafe { query.nearest::<$instructions>() }
-        }
+        mod $module {
+            #[allow(clippy::wildcard_imports, reason = "the inside of a macro")]
+            use super::*;
 
-        $(#[target_feature(enable = $features)])?
-        #[allow(unsafe_code, reason = "vector instructions")]
-        unsafe fn $occluded(query: &Query<'_>) -> bool {
-            // SAFETY: the caller knows that the processor has the instructions.
-            unsafe { query.occluded::<$instructions>() }
+            #[inline(never)]
+            $(#[target_feature(enable = $features)])?
+            unsafe fn nearest_placed(query: &Query<'_>, best: &mut Hit) {
+                // SAFETY: the caller knows that the processor has the instructions, here and below.
+                unsafe { query.nearest_placed::<$instructions>(best) }
+            }
+
+            #[inline(never)]
+            $(#[target_feature(enable = $features)])?
+            unsafe fn occluded_placed(query: &Query<'_>) -> bool {
+                // SAFETY: see above.
+                unsafe { query.occluded_placed::<$instructions>() }
+            }
+
+            $(#[target_feature(enable = $features)])?
+            pub(super) unsafe fn nearest(query: &Query<'_>) -> Option<Hit> {
+                let mut best = Hit {
+                    t: query.ray.t_max,
+                    u: 0.0,
+                    v: 0.0,
+                    id: PrimitiveId::NONE,
+                };
+                // SAFETY: see above.
+                unsafe { query.nearest_fixed::<$instructions>(&mut best) };
+                if query.bvh.top.is_some() {
+                    // SAFETY: see above.
+                    unsafe { nearest_placed(query, &mut best) };
+                }
+                (best.id != PrimitiveId::NONE).then_some(best)
+            }
+
+            $(#[target_feature(enable = $features)])?
+            pub(super) unsafe fn occluded(query: &Query<'_>) -> bool {
+                // SAFETY: see above.
+                unsafe { query.occluded_fixed::<$instructions>() || query.bvh.top.is_some() && occluded_placed(query) }
+            }
         }
     };
 }
 
-compile!(nearest_portable, occluded_portable, Portable);
+compile!(portable, Portable);
 #[cfg(target_arch = "x86_64")]
-compile!(nearest_avx2, occluded_avx2, Avx2, "avx2,fma,bmi1,bmi2,lzcnt");
+compile!(avx2, Avx2, "avx2,fma,bmi1,bmi2,lzcnt");
 #[cfg(target_arch = "x86_64")]
 compile!(
-    nearest_avx512,
-    occluded_avx512,
+    avx512,
     Avx512,
     "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt"
 );

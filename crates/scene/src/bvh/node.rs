@@ -3,7 +3,7 @@
 //!
 //! Differs: the step is a float, not a power of two; children are named one by one instead of by a base and a mask;
 //! the lower planes of each axis are stored twice, around the upper ones, so that reading 16 bytes from offset 0 or 8
-//! gives (near, far) planes for a ray going up or down that axis. Two cache lines in all.
+//! gives (near, far) planes for a ray going up or down that axis, and never crosses a cache line. Two lines in all.
 
 use super::bounds::Bounds;
 
@@ -23,14 +23,22 @@ const SLACK_STEPS: f64 = 1.0 / 64.0;
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(128))]
 pub(super) struct Node {
-    /// Per axis: eight lower planes, eight upper planes, the eight lower planes again, in steps from `origin`.
-    pub(super) planes: [[u8; 24]; 3],
-    /// Where plane 0 lies.
-    pub(super) origin: [f32; 3],
-    /// Distance between planes; positive.
-    pub(super) step: [f32; 3],
+    /// The boxes' planes across each axis.
+    pub(super) slabs: [Slabs; 3],
     /// [`LEAF`] and a leaf's index, or the index of a node.
     pub(super) child: [u32; WIDTH],
+}
+
+/// The planes of eight boxes across one axis.
+#[derive(Clone, Copy, Debug)]
+#[repr(C)]
+pub(super) struct Slabs {
+    /// Eight lower planes, eight upper planes, the eight lower planes again, in steps from `origin`.
+    pub(super) planes: [u8; 24],
+    /// Where plane 0 lies.
+    pub(super) origin: f32,
+    /// Distance between planes; positive.
+    pub(super) step: f32,
 }
 
 impl Node {
@@ -40,9 +48,11 @@ impl Node {
         debug_assert!(children.len() <= WIDTH);
         let all = children.iter().fold(Bounds::EMPTY, |all, (b, _)| all.union(*b));
         let mut node = Self {
-            planes: [[0; 24]; 3],
-            origin: [0.0; 3],
-            step: [1.0; 3],
+            slabs: [Slabs {
+                planes: [0; 24],
+                origin: 0.0,
+                step: 1.0,
+            }; 3],
             child: [empty; WIDTH],
         };
         for axis in 0..3 {
@@ -57,8 +67,9 @@ impl Node {
                 .max(f64::from(largest) * 2f64.powi(-21))
                 .max(1e-30) as f32;
             let origin = (f64::from(lower) - f64::from(step)) as f32;
-            node.step[axis] = step;
-            node.origin[axis] = origin;
+            let slabs = &mut node.slabs[axis];
+            slabs.step = step;
+            slabs.origin = origin;
             let quantise = |x: f32| (f64::from(x) - f64::from(origin)) / f64::from(step);
             for lane in 0..WIDTH {
                 let (low, high) = match children.get(lane) {
@@ -68,9 +79,9 @@ impl Node {
                     ),
                     None => (255, 0),
                 };
-                node.planes[axis][lane] = low;
-                node.planes[axis][lane + 8] = high;
-                node.planes[axis][lane + 16] = low;
+                slabs.planes[lane] = low;
+                slabs.planes[lane + 8] = high;
+                slabs.planes[lane + 16] = low;
             }
         }
         for (slot, (_, child)) in node.child.iter_mut().zip(children) {
@@ -108,10 +119,11 @@ mod tests {
             for (lane, (bounds, id)) in children.iter().enumerate() {
                 prop_assert_eq!(node.child[lane], *id);
                 for axis in 0..3 {
-                    let plane = |q: u8| f64::from(node.origin[axis]) + f64::from(q) * f64::from(node.step[axis]);
-                    prop_assert!(plane(node.planes[axis][lane]) < f64::from(bounds.min[axis]));
-                    prop_assert!(plane(node.planes[axis][lane + 8]) > f64::from(bounds.max[axis]));
-                    prop_assert_eq!(node.planes[axis][lane], node.planes[axis][lane + 16]);
+                    let slabs = &node.slabs[axis];
+                    let plane = |q: u8| f64::from(slabs.origin) + f64::from(q) * f64::from(slabs.step);
+                    prop_assert!(plane(slabs.planes[lane]) < f64::from(bounds.min[axis]));
+                    prop_assert!(plane(slabs.planes[lane + 8]) > f64::from(bounds.max[axis]));
+                    prop_assert_eq!(slabs.planes[lane], slabs.planes[lane + 16]);
                 }
             }
         }

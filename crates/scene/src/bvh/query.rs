@@ -1,8 +1,10 @@
 //! The two queries, in terms of [`walk`].
+//!
+//! Everything here is inlined into the functions that `compile!` makes, where the compiler knows the instruction set.
 
 use super::kernel::{Instructions, LocalRay, PackHits};
 use super::pack::{INDEX, MASKED, ONE_SIDED};
-use super::traverse::walk;
+use super::traverse::{Visitor, walk};
 use super::{Bvh, Hit, PrimitiveId, Ray, alpha};
 use crate::SceneParts;
 
@@ -15,148 +17,126 @@ pub(super) struct Query<'a> {
     pub(super) skip: [PrimitiveId; 2],
 }
 
+/// The triangles of one instance, for a query.
+struct InInstance<'a, I: Instructions> {
+    query: &'a Query<'a>,
+    ray: I::Ray,
+    instance: u32,
+    skip: [u32; 2],
+    hits: PackHits,
+}
+
+/// Looks for the nearest hit.
+struct Nearest<'a, I: Instructions> {
+    geometry: InInstance<'a, I>,
+    best: &'a mut Hit,
+}
+
+/// Looks for any hit.
+struct Any<'a, I: Instructions> {
+    geometry: InInstance<'a, I>,
+    found: bool,
+}
+
+/// Looks for the nearest hit in the instances it meets.
+struct NearestPlaced<'a> {
+    query: &'a Query<'a>,
+    best: &'a mut Hit,
+}
+
+/// Looks for any hit in the instances it meets.
+struct AnyPlaced<'a> {
+    query: &'a Query<'a>,
+    found: bool,
+}
+
 #[allow(unsafe_code, reason = "calls the kernels")]
-impl Query<'_> {
-    /// See [`Bvh::nearest`].
+impl<'a> Query<'a> {
+    /// [`Bvh::nearest`] among the geometry that is placed once; `best` is lowered.
     ///
     /// # Safety
-    /// That of [`Instructions`].
+    /// That of [`Instructions`], here as in all functions below.
     #[inline(always)]
-    pub(super) unsafe fn nearest<I: Instructions>(&self) -> Option<Hit> {
-        let mut best = Hit {
-            t: self.ray.t_max,
-            u: 0.0,
-            v: 0.0,
-            id: PrimitiveId::NONE,
-        };
+    pub(super) unsafe fn nearest_fixed<I: Instructions>(&self, best: &mut Hit) {
         if let Some(root) = self.bvh.fixed {
             let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             // SAFETY: as the caller promises.
-            unsafe { self.nearest_in::<I>(root, 0, &local, &mut best) };
+            unsafe { self.nearest_in::<I>(root, 0, &local, best) };
         }
+    }
+
+    /// [`Bvh::nearest`] among instanced geometry; `best` is lowered.
+    #[inline(always)]
+    pub(super) unsafe fn nearest_placed<I: Instructions>(&self, best: &mut Hit) {
         if let Some(root) = self.bvh.top {
             let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
-            let mut visit = |leaf: u32, _| {
-                let placed = &self.bvh.placed[leaf as usize];
-                let local = self.local(placed.instance);
-                // SAFETY: as the caller promises.
-                unsafe { self.nearest_in::<I>(placed.root, placed.instance, &local, &mut best) };
-                best.t
-            };
+            let t_max = best.t;
+            let mut visitor = NearestPlaced { query: self, best };
             // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<I>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visit) };
+            unsafe { walk::<I, true>(&self.bvh.nodes, root, &I::ray(&world), t_max, &mut visitor) };
         }
-        (best.id != PrimitiveId::NONE).then_some(best)
     }
 
-    /// See [`Bvh::occluded`].
-    ///
-    /// # Safety
-    /// That of [`Instructions`].
+    /// [`Bvh::occluded`] by the geometry that is placed once.
     #[inline(always)]
-    pub(super) unsafe fn occluded<I: Instructions>(&self) -> bool {
-        let mut found = false;
-        if let Some(root) = self.bvh.fixed {
+    pub(super) unsafe fn occluded_fixed<I: Instructions>(&self) -> bool {
+        self.bvh.fixed.is_some_and(|root| {
             let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             // SAFETY: as the caller promises.
-            found = unsafe { self.occluded_in::<I>(root, 0, &local) };
-        }
-        if let (Some(root), false) = (self.bvh.top, found) {
+            unsafe { self.occluded_in::<I>(root, 0, &local) }
+        })
+    }
+
+    /// [`Bvh::occluded`] by instanced geometry.
+    #[inline(always)]
+    pub(super) unsafe fn occluded_placed<I: Instructions>(&self) -> bool {
+        self.bvh.top.is_some_and(|root| {
             let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
-            let mut visit = |leaf: u32, t_max| {
-                let placed = &self.bvh.placed[leaf as usize];
-                let local = self.local(placed.instance);
-                // SAFETY: as the caller promises.
-                found = unsafe { self.occluded_in::<I>(placed.root, placed.instance, &local) };
-                if found { -1.0 } else { t_max }
+            let mut visitor = AnyPlaced {
+                query: self,
+                found: false,
             };
             // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<I>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visit) };
-        }
-        found
+            unsafe { walk::<I, false>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visitor) };
+            visitor.found
+        })
     }
 
-    /// Lowers `best` to the nearest hit in the mesh of one instance.
     #[inline(always)]
     unsafe fn nearest_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay, best: &mut Hit) {
-        let skip = self.skip_in(instance);
         let t_max = best.t;
-        let mut hits = PackHits::default();
-        // SAFETY: as the caller promises.
-        let ray = unsafe { I::ray(local) };
-        let visit = |leaf: u32, _| {
-            let pack = &self.bvh.packs[leaf as usize];
-            // SAFETY: as the caller promises.
-            let mut mask = unsafe { I::triangles(&ray, pack, best.t, &mut hits) };
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                if hits.t[lane] < best.t && self.counts(pack.tag[lane], lane, &hits, instance, skip) {
-                    *best = Hit {
-                        t: hits.t[lane],
-                        u: hits.u[lane],
-                        v: hits.v[lane],
-                        id: PrimitiveId {
-                            instance,
-                            triangle: pack.tag[lane] & INDEX,
-                        },
-                    };
-                }
-            }
-            best.t
-        };
         // SAFETY: as the caller promises; `root` was made by `collapse`.
-        unsafe { walk::<I>(&self.bvh.nodes, root, &ray, t_max, visit) };
+        unsafe {
+            let geometry = self.in_instance::<I>(instance, local);
+            let ray = geometry.ray;
+            walk::<I, true>(&self.bvh.nodes, root, &ray, t_max, &mut Nearest { geometry, best });
+        }
     }
 
-    /// Whether anything is hit in the mesh of one instance.
     #[inline(always)]
     unsafe fn occluded_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay) -> bool {
-        let skip = self.skip_in(instance);
-        let mut hits = PackHits::default();
-        let mut found = false;
-        // SAFETY: as the caller promises.
-        let ray = unsafe { I::ray(local) };
-        let visit = |leaf: u32, t_max| {
-            let pack = &self.bvh.packs[leaf as usize];
-            // SAFETY: as the caller promises.
-            let mut mask = unsafe { I::triangles(&ray, pack, t_max, &mut hits) };
-            while mask != 0 {
-                let lane = mask.trailing_zeros() as usize;
-                mask &= mask - 1;
-                if self.counts(pack.tag[lane], lane, &hits, instance, skip) {
-                    found = true;
-                    return -1.0;
-                }
-            }
-            t_max
-        };
         // SAFETY: as the caller promises; `root` was made by `collapse`.
-        unsafe { walk::<I>(&self.bvh.nodes, root, &ray, self.ray.t_max, visit) };
-        found
+        unsafe {
+            let geometry = self.in_instance::<I>(instance, local);
+            let ray = geometry.ray;
+            let mut visitor = Any { geometry, found: false };
+            walk::<I, false>(&self.bvh.nodes, root, &ray, self.ray.t_max, &mut visitor);
+            visitor.found
+        }
     }
 
-    /// Whether a triangle that was hit is there: neither skipped, nor seen from a side that it lacks, nor cut out by its
-    /// texture.
     #[inline(always)]
-    fn counts(&self, tag: u32, lane: usize, hits: &PackHits, instance: u32, skip: [u32; 2]) -> bool {
-        let triangle = tag & INDEX;
-        if triangle == skip[0] || triangle == skip[1] {
-            return false;
+    unsafe fn in_instance<I: Instructions>(&self, instance: u32, local: &LocalRay) -> InInstance<'_, I> {
+        InInstance {
+            query: self,
+            // SAFETY: as the caller promises.
+            ray: unsafe { I::ray(local) },
+            instance,
+            skip: self
+                .skip
+                .map(|id| if id.instance == instance { id.triangle } else { u32::MAX }),
+            hits: PackHits::default(),
         }
-        // In the space of the mesh, where a mirroring instance changes nothing: glTF 2.0 section 3.7.4 turns the
-        // winding round for those.
-        if tag & ONE_SIDED != 0 && hits.back >> lane & 1 != 0 {
-            return false;
-        }
-        tag & MASKED == 0 || alpha::visible(self.parts, instance, triangle, hits.u[lane], hits.v[lane])
-    }
-
-    /// The triangles of `instance` to skip.
-    #[inline(always)]
-    fn skip_in(&self, instance: u32) -> [u32; 2] {
-        self.skip
-            .map(|id| if id.instance == instance { id.triangle } else { u32::MAX })
     }
 
     /// The ray in the space of an instance's mesh; distances stay the same.
@@ -167,5 +147,118 @@ impl Query<'_> {
             local_from_world.transform_point3(self.ray.origin_ws),
             local_from_world.transform_vector3(self.ray.direction_ws),
         )
+    }
+}
+
+#[allow(unsafe_code, reason = "calls the kernels")]
+impl<I: Instructions> InInstance<'_, I> {
+    /// The first lane of a leaf whose hit passes `accept(t)` and whose triangle counts, and its tag.
+    #[inline(always)]
+    unsafe fn test(&mut self, leaf: u32, t_max: f32, mut hit: impl FnMut(&PackHits, usize, u32) -> bool) {
+        // SAFETY: leaves of a mesh's tree are indices of packs; the rest as the caller promises.
+        let (pack, mut mask) = unsafe {
+            let pack = self.query.bvh.packs.get_unchecked(leaf as usize);
+            (pack, I::triangles(&self.ray, pack, t_max, &mut self.hits))
+        };
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask - 1;
+            if self.counts(pack.tag[lane], lane) && hit(&self.hits, lane, pack.tag[lane] & INDEX) {
+                return;
+            }
+        }
+    }
+
+    /// Whether a triangle that was hit is there: neither skipped, nor seen from a side that it lacks, nor cut out by its
+    /// texture.
+    #[inline(always)]
+    fn counts(&self, tag: u32, lane: usize) -> bool {
+        let triangle = tag & INDEX;
+        if triangle == self.skip[0] || triangle == self.skip[1] {
+            return false;
+        }
+        // In the space of the mesh, where a mirroring instance changes nothing: glTF 2.0 section 3.7.4 turns the
+        // winding round for those.
+        if tag & ONE_SIDED != 0 && self.hits.back >> lane & 1 != 0 {
+            return false;
+        }
+        tag & MASKED == 0
+            || alpha::visible(
+                self.query.parts,
+                self.instance,
+                triangle,
+                self.hits.u[lane],
+                self.hits.v[lane],
+            )
+    }
+}
+
+#[allow(unsafe_code, reason = "calls the kernels")]
+impl<I: Instructions> Visitor<I> for Nearest<'_, I> {
+    #[inline(always)]
+    unsafe fn leaf(&mut self, leaf: u32, t_max: f32) -> f32 {
+        let instance = self.geometry.instance;
+        let mut t_max = t_max;
+        // SAFETY: as the caller promises.
+        unsafe {
+            self.geometry.test(leaf, t_max, |hits, lane, triangle| {
+                if hits.t[lane] < t_max {
+                    let id = PrimitiveId { instance, triangle };
+                    t_max = hits.t[lane];
+                    *self.best = Hit {
+                        t: t_max,
+                        u: hits.u[lane],
+                        v: hits.v[lane],
+                        id,
+                    };
+                }
+                false
+            });
+        }
+        t_max
+    }
+}
+
+#[allow(unsafe_code, reason = "calls the kernels")]
+impl<I: Instructions> Visitor<I> for Any<'_, I> {
+    #[inline(always)]
+    unsafe fn leaf(&mut self, leaf: u32, t_max: f32) -> f32 {
+        let mut found = false;
+        // SAFETY: as the caller promises.
+        unsafe {
+            self.geometry.test(leaf, t_max, |_, _, _| {
+                found = true;
+                true
+            });
+        }
+        self.found = found;
+        if found { -1.0 } else { t_max }
+    }
+}
+
+#[allow(unsafe_code, reason = "calls the kernels")]
+impl<I: Instructions> Visitor<I> for NearestPlaced<'_> {
+    #[inline(always)]
+    unsafe fn leaf(&mut self, leaf: u32, _t_max: f32) -> f32 {
+        let placed = &self.query.bvh.placed[leaf as usize];
+        let local = self.query.local(placed.instance);
+        // SAFETY: as the caller promises.
+        unsafe {
+            self.query
+                .nearest_in::<I>(placed.root, placed.instance, &local, self.best)
+        };
+        self.best.t
+    }
+}
+
+#[allow(unsafe_code, reason = "calls the kernels")]
+impl<I: Instructions> Visitor<I> for AnyPlaced<'_> {
+    #[inline(always)]
+    unsafe fn leaf(&mut self, leaf: u32, t_max: f32) -> f32 {
+        let placed = &self.query.bvh.placed[leaf as usize];
+        let local = self.query.local(placed.instance);
+        // SAFETY: as the caller promises.
+        self.found = unsafe { self.query.occluded_in::<I>(placed.root, placed.instance, &local) };
+        if self.found { -1.0 } else { t_max }
     }
 }

@@ -8,8 +8,21 @@ use std::mem::MaybeUninit;
 /// Each node on a path leaves at most all children but one behind.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 
-/// Walks from `root`; `leaf` is called with the index of each leaf that the ray may meet in \[0, `t_max`\], about nearest
-/// first, and returns the new `t_max`, negative to stop.
+/// What to do at leaves.
+#[allow(
+    unsafe_code,
+    reason = "vector instructions are unsafe to use where the processor lacks them"
+)]
+pub(super) trait Visitor<I: Instructions> {
+    /// Called with a leaf's index and the present `t_max`; returns the new one, negative to stop.
+    ///
+    /// # Safety
+    /// That of [`Instructions`].
+    unsafe fn leaf(&mut self, leaf: u32, t_max: f32) -> f32;
+}
+
+/// Walks from `root` to each leaf that the ray may meet in \[0, `t_max`\]. `ORDERED`: about nearest first, which pays
+/// where hits lower `t_max`.
 ///
 /// # Safety
 /// That of [`Instructions`]; and `root` must come from [`super::collapse::collapse`] into `nodes`.
@@ -18,57 +31,94 @@ const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
     reason = "bounds checks and clearing the stack cost a tenth of the time"
 )]
 #[inline(always)]
-pub(super) unsafe fn walk<I: Instructions>(
+pub(super) unsafe fn walk<I: Instructions, const ORDERED: bool>(
     nodes: &[Node],
     root: u32,
     ray: &I::Ray,
     mut t_max: f32,
-    mut leaf: impl FnMut(u32, f32) -> f32,
+    visitor: &mut impl Visitor<I>,
 ) {
-    // Entry distance in the upper half, child in the lower: distances are at least 0, so integers sort like them.
-    let mut stack: [MaybeUninit<u64>; STACK] = [const { MaybeUninit::uninit() }; STACK];
+    let mut stack = [const { MaybeUninit::<Entry>::uninit() }; STACK];
+    let stack: *mut Entry = stack.as_mut_ptr().cast();
     let mut height = 0usize;
     let mut near = [0.0f32; WIDTH];
     let mut current = root;
-    loop {
-        if current & LEAF != 0 {
-            t_max = leaf(current & !LEAF, t_max);
-        } else {
-            // SAFETY: child references of inner nodes are indices into `nodes` by construction.
-            let node = unsafe { nodes.get_unchecked(current as usize) };
-            // SAFETY: as the caller promises.
-            let mut mask = unsafe { I::boxes(ray, node, t_max, &mut near) };
-            if mask != 0 {
-                let first = height;
-                while mask != 0 {
+    // SAFETY: child references of inner nodes are indices into `nodes` by construction, lanes are less than 8, the
+    // instructions are there as the caller promises, and `collapse` limits the depth of the tree to that of the stack,
+    // of which only what was written is read.
+    unsafe {
+        loop {
+            if current & LEAF != 0 {
+                t_max = visitor.leaf(current & !LEAF, t_max);
+            } else {
+                let node = nodes.get_unchecked(current as usize);
+                let mut mask = I::boxes(ray, node, t_max, &mut near);
+                if mask != 0 {
                     let lane = mask.trailing_zeros() as usize;
                     mask &= mask - 1;
-                    let entry = u64::from(near[lane].to_bits()) << 32 | u64::from(node.child[lane]);
-                    // Insertion, farthest at the bottom.
-                    let mut at = height;
-                    // SAFETY: `collapse` limits the depth, so `height` stays below STACK; below `height` all is set.
-                    unsafe {
-                        while at > first && stack.get_unchecked(at - 1).assume_init() < entry {
-                            *stack.get_unchecked_mut(at) = *stack.get_unchecked(at - 1);
-                            at -= 1;
-                        }
-                        *stack.get_unchecked_mut(at) = MaybeUninit::new(entry);
+                    current = *node.child.get_unchecked(lane);
+                    if mask == 0 {
+                        continue;
                     }
-                    height += 1;
+                    let mut last = Entry::new(*near.get_unchecked(lane), current);
+                    let bottom = height;
+                    while mask != 0 {
+                        let lane = mask.trailing_zeros() as usize;
+                        mask &= mask - 1;
+                        let next = Entry::new(*near.get_unchecked(lane), *node.child.get_unchecked(lane));
+                        // `last` stays the nearest; those on the stack are sorted, the farthest lowest.
+                        let (nearer, farther) = if ORDERED && last < next {
+                            (last, next)
+                        } else {
+                            (next, last)
+                        };
+                        let mut at = height;
+                        if ORDERED {
+                            while at > bottom && *stack.add(at - 1) < farther {
+                                *stack.add(at) = *stack.add(at - 1);
+                                at -= 1;
+                            }
+                        }
+                        *stack.add(at) = farther;
+                        height += 1;
+                        last = nearer;
+                    }
+                    current = last.child();
+                    continue;
+                }
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let entry = *stack.add(height);
+                if entry.near() <= t_max {
+                    current = entry.child();
+                    break;
                 }
             }
         }
-        loop {
-            if height == 0 {
-                return;
-            }
-            height -= 1;
-            // SAFETY: everything below `height` was written.
-            let entry = unsafe { stack.get_unchecked(height).assume_init() };
-            if f32::from_bits((entry >> 32) as u32) <= t_max {
-                current = entry as u32;
-                break;
-            }
-        }
+    }
+}
+
+/// Entry distance in the upper half, child in the lower: distances are at least 0, so integers sort like them.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Entry(u64);
+
+impl Entry {
+    #[inline(always)]
+    fn new(near: f32, child: u32) -> Self {
+        Self(u64::from(near.to_bits()) << 32 | u64::from(child))
+    }
+
+    #[inline(always)]
+    fn child(self) -> u32 {
+        self.0 as u32
+    }
+
+    #[inline(always)]
+    fn near(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
     }
 }

@@ -53,10 +53,10 @@ impl Instructions for Avx2 {
             let mut enter = _mm256_setzero_ps();
             let mut leave = _mm256_set1_ps(t_max);
             for axis in 0..3 {
-                let planes = node.planes[axis].as_ptr().add(ray.near[axis]);
+                let planes = node.slabs[axis].planes.as_ptr().add(ray.near[axis]);
                 let steps = |p: *const u8| _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(p.cast())));
-                let step = _mm256_set1_ps(node.step[axis]);
-                let offset = _mm256_sub_ps(_mm256_set1_ps(node.origin[axis]), ray.origin[axis]);
+                let step = _mm256_set1_ps(node.slabs[axis].step);
+                let offset = _mm256_sub_ps(_mm256_set1_ps(node.slabs[axis].origin), ray.origin[axis]);
                 let (inverse, inverse_far) = (ray.inverse[axis], ray.inverse_far[axis]);
                 let t_near = _mm256_fmadd_ps(
                     steps(planes),

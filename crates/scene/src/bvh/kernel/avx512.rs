@@ -56,10 +56,10 @@ impl Instructions for Avx512 {
         // which 16 are read.
         unsafe {
             let distance = |axis: usize| {
-                let planes = node.planes[axis].as_ptr().add(ray.near[axis]);
+                let planes = node.slabs[axis].planes.as_ptr().add(ray.near[axis]);
                 let steps = _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(_mm_loadu_si128(planes.cast())));
-                let scale = _mm512_mul_ps(ray.inverse[axis], _mm512_set1_ps(node.step[axis]));
-                let offset = _mm512_sub_ps(ray.origin[axis], _mm512_set1_ps(node.origin[axis]));
+                let scale = _mm512_mul_ps(ray.inverse[axis], _mm512_set1_ps(node.slabs[axis].step));
+                let offset = _mm512_sub_ps(ray.origin[axis], _mm512_set1_ps(node.slabs[axis].origin));
                 _mm512_fmsub_ps(steps, scale, _mm512_mul_ps(offset, ray.inverse[axis]))
             };
             // The largest of the far planes' negated distances is the negated distance of leaving.

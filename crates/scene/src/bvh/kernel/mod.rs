@@ -75,7 +75,7 @@ pub(super) struct LocalRay {
 
 impl LocalRay {
     /// `direction` of any length but zero.
-    #[inline]
+    #[inline(always)]
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
         /// Smallest component of a direction; smaller ones would make infinite reciprocals, and those NaN.
         const SMALLEST: f32 = 1e-20;
@@ -123,7 +123,7 @@ pub(super) struct PackHits {
 ///
 /// # Safety
 /// The functions may be called only where the processor has the instructions, and are fast only where they are inlined
-/// into a function for which the compiler knows that. `node.planes` and `ray.near` must be as [`LocalRay::new`] and
+/// into a function for which the compiler knows that. `node.slabs` and `ray.near` must be as [`LocalRay::new`] and
 /// [`Node::new`] make them.
 #[allow(
     unsafe_code,

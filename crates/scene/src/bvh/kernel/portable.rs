@@ -26,10 +26,13 @@ impl Instructions for Portable {
         let mut enter = [0.0f32; WIDTH];
         let mut leave = [t_max; WIDTH];
         for axis in 0..3 {
-            let offset = node.origin[axis] - ray.origin[axis];
-            let (scale_near, offset_near) = (node.step[axis] * ray.inverse[axis], offset * ray.inverse[axis]);
-            let (scale_far, offset_far) = (node.step[axis] * ray.inverse_far[axis], offset * ray.inverse_far[axis]);
-            let planes = &node.planes[axis][ray.near[axis]..ray.near[axis] + 16];
+            let offset = node.slabs[axis].origin - ray.origin[axis];
+            let (scale_near, offset_near) = (node.slabs[axis].step * ray.inverse[axis], offset * ray.inverse[axis]);
+            let (scale_far, offset_far) = (
+                node.slabs[axis].step * ray.inverse_far[axis],
+                offset * ray.inverse_far[axis],
+            );
+            let planes = &node.slabs[axis].planes[ray.near[axis]..ray.near[axis] + 16];
             for lane in 0..WIDTH {
                 let t_near = f32::from(planes[lane]) * scale_near + offset_near;
                 let t_far = f32::from(planes[lane + 8]) * scale_far + offset_far;
