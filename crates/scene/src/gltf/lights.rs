@@ -1,5 +1,6 @@
 //! `KHR_lights_punctual`.
 
+use super::geometry::MAX_COORDINATE;
 use super::json::{PunctualKind, PunctualLight};
 use super::nodes::{Placed, label};
 use super::source::Source;
@@ -76,7 +77,8 @@ fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report)
         ));
         return None;
     }
-    if !(position_ws.abs().max_element() <= super::geometry::MAX_COORDINATE) && kind != LightKind::Directional {
+    let near = position_ws.abs().max_element() <= MAX_COORDINATE;
+    if !near && kind != LightKind::Directional {
         report.warn(format!("{place}: too far away, left out"));
         return None;
     }

@@ -27,24 +27,11 @@ impl Motion {
         }
     }
 
-    /// Whether it flattens space, so that there is no way back for rays.
-    pub(super) fn is_singular(&self) -> bool {
-        self.normals.is_none()
-    }
-
-    /// An instance of mesh `mesh`, moved so; not for singular transforms.
-    pub(super) fn instance(&self, mesh: u32, origin: u32) -> Instance {
+    /// An instance of mesh `mesh`, moved so; `None` if the transform is singular, so that there is no way back for rays.
+    pub(super) fn instance(&self, mesh: u32, origin: u32) -> Option<Instance> {
         let world = self.world;
-        Instance {
-            mesh,
-            origin,
-            world_from_local: affine(world),
-            local_from_world: affine(world.inverse()),
-            // The winding of a mirrored mesh is flipped (glTF 2.0 section 3.7.4), and so is the handedness of the world it
-            // is seen in: the two cancel, and the inverse transpose alone keeps normals on their side.
-            world_normal_from_local: self.normals.unwrap_or(DMat3::IDENTITY).as_mat3().into(),
-            identity: world == DAffine3::IDENTITY,
-        }
+        let affine = Affine3A::from_mat3_translation(world.matrix3.as_mat3(), world.translation.as_vec3());
+        self.normals.and_then(|_| Instance::new(mesh, origin, affine))
     }
 
     fn point(&self, p: Vec3) -> Vec3 {
@@ -62,10 +49,6 @@ impl Motion {
         let handedness = if self.mirrored { -t.w } else { t.w };
         direction.try_normalize().unwrap_or(Vec3::X).extend(handedness)
     }
-}
-
-fn affine(a: DAffine3) -> Affine3A {
-    Affine3A::from_mat3_translation(a.matrix3.as_mat3(), a.translation.as_vec3())
 }
 
 /// Appends the triangles and vertices of `part` to `mesh`, moved if asked to; `materials` and `origins` are left to the

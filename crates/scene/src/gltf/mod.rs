@@ -21,7 +21,7 @@ mod tangents;
 #[cfg(test)]
 mod tests;
 
-use crate::{Mesh, SceneError, SceneParts};
+use crate::{Instance, Mesh, SceneError, SceneParts};
 use bounds::Bounds;
 use geometry::{Budget, mesh_name};
 use merge::{Motion, append};
@@ -123,7 +123,7 @@ fn used_materials(source: &Source, placements: &[Vec<Placed>]) -> Result<Vec<boo
 /// Puts a mesh where it stands: copied into the static mesh 0, or, where the copies would be large, as instances.
 fn place(
     source: &Source,
-    mut mesh: Mesh,
+    mesh: Mesh,
     placements: &[Placed],
     parts: &mut SceneParts,
     budget: &mut Budget,
@@ -147,8 +147,8 @@ fn place(
         }
         let origin = parts.origins.len() as u32 - 1;
         let motion = Motion::new(placement.world);
-        if shared && !motion.is_singular() {
-            parts.instances.push(motion.instance(local, origin));
+        if shared && let Some(instance) = motion.instance(local, origin) {
+            parts.instances.push(instance);
             instanced = true;
             continue;
         }
@@ -160,7 +160,6 @@ fn place(
         fixed.origins.extend(std::iter::repeat_n(origin, mesh.len()));
     }
     if instanced {
-        mesh.materials.shrink_to_fit();
         parts.meshes.push(mesh);
     }
     Ok(())
@@ -174,9 +173,7 @@ fn finish_static_mesh(parts: &mut SceneParts) {
             parts.meshes.remove(0);
             parts.instances.iter_mut().for_each(|instance| instance.mesh -= 1);
         }
-        Some(_) => parts
-            .instances
-            .insert(0, Motion::new(glam::DAffine3::IDENTITY).instance(0, 0)),
+        Some(_) => parts.instances.insert(0, Instance::identity(0, 0)),
     }
 }
 
@@ -194,11 +191,6 @@ fn remark(source: &Source, parts: &mut SceneParts) {
     if parts.punctual.is_empty() && !parts.meshes.iter().any(emitting) {
         report.warn("the scene has no lights: the image will be black");
     }
-    if parts.textures.is_empty() {
-        report
-            .skipped
-            .push("no textures: no texture coordinates, no texture look-ups".into());
-    }
     let unused = source.json.images.len().saturating_sub(parts.textures.len());
     if unused > 0 {
         report
@@ -207,9 +199,6 @@ fn remark(source: &Source, parts: &mut SceneParts) {
     }
     if !parts.textures.is_empty() && parts.meshes.iter().all(|mesh| mesh.tangents.is_empty()) {
         report.skipped.push("no normal maps: no tangents".into());
-    }
-    if parts.meshes.iter().all(|mesh| mesh.normals.is_empty()) {
-        report.skipped.push("no smooth normals: all triangles are flat".into());
     }
 }
 
