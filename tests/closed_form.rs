@@ -4,13 +4,13 @@ use glam::{DVec3, Vec3};
 use light_cache::SamplerKind;
 use render::Method;
 use scene::{Camera, Material, Scene};
-use tests::compare::{Plan, estimate, sampled};
+use tests::compare::{Case, Plan, sampled};
 use tests::scenes::{Builder, directional, ground, meter, point, spot};
 
 /// Asserts that the mean luminance of the image is `expected` to within 4 standard errors (a right program fails once
 /// in 15,000) plus the rounding of single precision.
 fn assert_radiance(what: &str, scene: &Scene, camera: &Camera, plan: &Plan, expected: f64) {
-    let measured = estimate(scene, camera, plan).mean;
+    let measured = Case::new(scene, camera, plan.clone()).estimate().mean;
     let difference = (measured.mean() - expected).abs();
     let tolerance = 4.0 * measured.standard_error() + 2e-5 * expected;
     assert!(
@@ -98,7 +98,7 @@ fn nothing_reflects_more_than_it_receives() {
         builder.quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X, white);
         let camera = meter(Vec3::new(0.0, 1.5, 1.0), Vec3::ZERO, 0.3);
         let plan = Plan::new(Method::Exact, 4, 4).effort(64, 16);
-        let seen = estimate(&builder.build(), &camera, &plan).mean;
+        let seen = Case::new(&builder.build(), &camera, plan).estimate().mean;
         assert!(
             seen.mean() <= 1.0 + 4.0 * seen.standard_error() + 1e-4,
             "{name} returns {}",

@@ -6,4 +6,4 @@
 pub mod compare;
 pub mod scenes;
 
-pub use compare::{Estimate, assert_same, estimate};
+pub use compare::{Case, Measured, Plan, assert_same};

@@ -4,7 +4,7 @@
 
 use light_cache::SamplerKind;
 use render::Method;
-use tests::compare::{Plan, assert_same, estimate, sampled};
+use tests::compare::{Case, Plan, assert_same, sampled};
 use tests::scenes::{still_life, still_life_camera};
 
 const WIDTH: u32 = 32;
@@ -15,16 +15,14 @@ const REFERENCE_SEED: u64 = 1 << 32;
 
 fn check_scene(name: &str, scene: &scene::Scene, camera: &scene::Camera) {
     for bounces in [0, 4] {
-        let reference = Plan::new(Method::Exact, WIDTH, HEIGHT)
-            .bounces(bounces)
-            .effort(4, 16)
-            .seed(REFERENCE_SEED);
-        let reference = estimate(scene, camera, &reference);
-        assert!(reference.mean.mean() > 0.0, "{name}: the view is black");
+        let plan = |method| Plan::new(method, WIDTH, HEIGHT).bounces(bounces);
+        let reference = plan(Method::Exact).effort(4, 32).seed(REFERENCE_SEED);
+        let reference = Case::new(scene, camera, reference).measure();
+        assert!(reference.estimate.mean.mean() > 0.0, "{name}: the view is black");
         for kind in SamplerKind::ALL {
-            let plan = Plan::new(sampled(kind), WIDTH, HEIGHT).bounces(bounces).effort(16, 24);
             let what = format!("{name}, {bounces} bounces, {}", kind.name());
-            assert_same(&what, &estimate(scene, camera, &plan), &reference);
+            let case = Case::new(scene, camera, plan(sampled(kind)).effort(16, 32));
+            assert_same(&what, &case, &reference);
         }
     }
 }
