@@ -82,19 +82,23 @@ pub(crate) struct Bounds {
     pub(crate) min: Vec3,
     /// Upper corner.
     pub(crate) max: Vec3,
-    /// Radius of a sphere around the middle of the box that holds them all.
-    pub(crate) radius: f32,
     /// Where they send light.
     pub(crate) cone: Cone,
 }
 
 impl Bounds {
-    /// Bounds of one light: a sphere, and its cone.
-    pub(crate) fn of(leaf: &LeafLight, light: &Light) -> Self {
+    /// Bounds of one light.
+    pub(crate) fn of(light: &Light) -> Self {
+        let first = light.position_ws;
+        let (min, max) = if light.kind == LightKind::Triangle {
+            let (second, third) = (first + light.edge1_ws, first + light.edge2_ws);
+            (first.min(second).min(third), first.max(second).max(third))
+        } else {
+            (first, first)
+        };
         Self {
-            min: leaf.center - Vec3::splat(leaf.radius),
-            max: leaf.center + Vec3::splat(leaf.radius),
-            radius: leaf.radius,
+            min,
+            max,
             cone: Cone::of(light),
         }
     }
@@ -106,17 +110,11 @@ impl Bounds {
 
     /// Bounds of both.
     pub(crate) fn union(&self, other: &Self) -> Self {
-        let mut merged = Self {
+        Self {
             min: self.min.min(other.min),
             max: self.max.max(other.max),
-            radius: 0.0,
             cone: self.cone.union(other.cone),
-        };
-        let center = merged.center();
-        let around = |b: &Self| center.distance(b.center()) + b.radius;
-        let half_diagonal = 0.5 * (merged.max - merged.min).length();
-        merged.radius = around(self).max(around(other)).min(half_diagonal);
-        merged
+        }
     }
 }
 

@@ -43,11 +43,12 @@ impl CellReceiver {
 
     fn group(&self, node: &Node) -> f32 {
         let to = node.center - self.center;
-        let cos = self.cos_emitter(to, node.radius, node.axis, node.cos_o, node.sin_o);
+        let radius = node.half.length();
+        let cos = self.cos_emitter(to, radius, node.axis, node.cos_o, node.sin_o);
         if cos <= node.cos_e {
             0.0
         } else {
-            node.weight * cos.max(0.0) * self.falloff(to, node.radius)
+            node.weight * cos.max(0.0) * self.falloff(to, radius)
         }
     }
 

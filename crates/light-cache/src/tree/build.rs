@@ -46,9 +46,7 @@ fn build_group(
     base: u32,
 ) -> (Bounds, u32) {
     if leaves.len() <= MAX_LEAF_LIGHTS {
-        let mut all = leaves
-            .iter()
-            .map(|leaf| Bounds::of(leaf, &lights[leaf.index() as usize]));
+        let mut all = leaves.iter().map(|leaf| Bounds::of(&lights[leaf.index() as usize]));
         let start = all.next().expect("no group is empty");
         return (all.fold(start, |sum, bounds| sum.union(&bounds)), LEAF);
     }
@@ -102,25 +100,23 @@ fn rebase(nodes: &mut [Node], child: u32, base: u32) -> u32 {
 /// The node for a group with these bounds.
 fn node(bounds: &Bounds, child: u32, leaves: &[LeafLight], first: u32) -> Node {
     let center = bounds.center();
-    // Outwards by more than rounding can do: a few units in the last place of the coordinates, and of the radius.
-    let radius = bounds.radius * 1.0001 + 1e-6 * center.abs().max_element();
+    // Outwards by more than rounding can do: a few units in the last place of the coordinates, and of the size.
+    let half = 0.5001 * (bounds.max - bounds.min) + 1e-6 * center.abs().max_element();
     let cone = bounds.cone;
     // A milliradian more than exact (many-light-sampling hazard: cones that are not conservative).
     let cos_e = (cone.theta_e + 1e-3).min(std::f32::consts::PI).cos();
     let everywhere = cone.theta_o >= std::f32::consts::PI;
     Node {
         center,
-        radius,
+        half,
         axis: cone.axis,
         cos_o: if everywhere { -1.0 } else { cone.theta_o.cos() },
         sin_o: if everywhere { 0.0 } else { cone.theta_o.sin() },
         cos_e,
-        flux: leaves.iter().map(|leaf| leaf.weight).sum(),
         weight: leaves.iter().map(|leaf| leaf.weight).sum(),
         first,
         count: leaves.len() as u32,
         child,
-        parent: 0,
     }
 }
 

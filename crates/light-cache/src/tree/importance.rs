@@ -10,6 +10,8 @@ use glam::Vec3;
 
 /// Share of its full strength that a group keeps where it barely reaches, against rounding at that border.
 const MARGIN: f32 = 1e-4;
+/// Cosine of the half angle below which the normals of a group count as one.
+const PARALLEL: f32 = 0.999_999;
 
 /// Where the light is wanted, as importance reads it.
 #[derive(Clone, Copy, Debug)]
@@ -18,6 +20,17 @@ pub(crate) struct Receiver {
     pub(crate) position: Vec3,
     /// Unit normal.
     pub(crate) normal: Vec3,
+}
+
+/// Mean of what is positive in \[middle - reach, middle + reach\]; zero only if nothing is.
+#[inline]
+fn mean_above(middle: f32, reach: f32) -> f32 {
+    if middle >= reach {
+        middle
+    } else {
+        let above = (middle + reach).max(0.0);
+        above * above / (4.0 * reach).max(f32::MIN_POSITIVE)
+    }
 }
 
 impl From<&ShadingPoint> for Receiver {
@@ -31,34 +44,32 @@ impl From<&ShadingPoint> for Receiver {
 }
 
 impl Receiver {
-    /// Importance of a group: Conty Estevez and Kulla 2018, section 5, equation 3, without angles: all is done in sines and cosines.
-    ///
-    /// Differs: the squared distance is clamped by a squared length (the group's half radius), so importance does not depend on
-    /// the unit of length.
+    /// Importance of a group.
     #[inline]
     pub(crate) fn group(&self, node: &Node) -> f32 {
         let to = node.center - self.position;
-        let distance_sq = to.length_squared();
-        let radius_sq = node.radius * node.radius;
-        let height = self.normal.dot(to);
-        if height + node.radius <= 0.0 {
+        let height = mean_above(self.normal.dot(to), self.normal.abs().dot(node.half));
+        if height <= 0.0 {
             return 0.0;
         }
-        if distance_sq <= radius_sq {
-            return node.weight / distance_sq.max(0.25 * radius_sq).max(f32::MIN_POSITIVE);
-        }
-        let inverse_distance = 1.0 / distance_sq.sqrt();
-        let sin_u = node.radius * inverse_distance;
-        let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
-        let cos_i = height * inverse_distance;
-        let cos_receiver = if cos_i >= cos_u {
-            1.0
-        } else {
-            cos_i * cos_u + (1.0 - cos_i * cos_i).max(0.0).sqrt() * sin_u
-        };
+        let distance_sq = to.length_squared();
+        let radius_sq = node.half.length_squared();
+        let nearest = (to.abs() - node.half).max(Vec3::ZERO).length();
+        let cos_receiver = if height < nearest { height / nearest } else { 1.0 };
         let cos_emitter = if node.cos_o <= -1.0 {
             1.0
+        } else if node.cos_o >= PARALLEL {
+            let facing = mean_above(-node.axis.dot(to), node.axis.abs().dot(node.half));
+            if facing <= 0.0 {
+                return 0.0;
+            }
+            if facing < nearest { facing / nearest } else { 1.0 }
+        } else if distance_sq <= radius_sq {
+            1.0
         } else {
+            let inverse_distance = 1.0 / distance_sq.sqrt();
+            let sin_u = radius_sq.sqrt() * inverse_distance;
+            let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
             let cos_t = -node.axis.dot(to) * inverse_distance;
             let sin_t = (1.0 - cos_t * cos_t).max(0.0).sqrt();
             let (cos_x, sin_x) = if cos_t >= node.cos_o {
@@ -79,7 +90,7 @@ impl Receiver {
             }
             cos_x.max(MARGIN)
         };
-        node.weight * cos_receiver.max(MARGIN) * cos_emitter / distance_sq
+        node.weight * cos_receiver * cos_emitter / distance_sq.max(radius_sq).max(f32::MIN_POSITIVE)
     }
 
     /// Importance of one light: its irradiance from the centre, softened where it is seen at close range, so that no
@@ -100,15 +111,10 @@ impl Receiver {
             let attenuation = light.attenuation(d_sq * inverse_distance, -light.axis.dot(to) * inverse_distance);
             return light.weight * attenuation * (height * inverse_distance * inverse_distance * inverse_distance);
         }
-        // Mean height over [height - radius, height + radius], what is below counted as 0.
-        let height = if height >= radius {
-            height
-        } else if height > -radius {
-            let above = height + radius;
-            above * above / (4.0 * radius)
-        } else {
+        let height = mean_above(height, radius);
+        if height <= 0.0 {
             return 0.0;
-        };
+        }
         let radius_sq = radius * radius;
         let plane = -light.axis.dot(to);
         let plane = if emission == Emission::TwoSided {

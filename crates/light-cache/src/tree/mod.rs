@@ -35,10 +35,10 @@ pub(crate) const MAX_LEAF_LIGHTS: usize = 4;
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
-    /// Centre of a sphere that holds all the lights, world space.
+    /// Middle of the box around the lights, world space.
     pub(crate) center: Vec3,
-    /// Its radius, metres.
-    pub(crate) radius: f32,
+    /// Half the size of the box, metres.
+    pub(crate) half: Vec3,
     /// Axis of the cone of normals.
     pub(crate) axis: Vec3,
     /// Cosine of the cone's half angle; -1: all directions.
@@ -47,9 +47,7 @@ pub(crate) struct Node {
     pub(crate) sin_o: f32,
     /// Cosine of the angle around each normal beyond which nothing is emitted.
     pub(crate) cos_e: f32,
-    /// Sum of the lights' strengths, in units of the strongest.
-    pub(crate) flux: f32,
-    /// The same, each light times what was learned about it.
+    /// Sum of the lights' strengths, in units of the strongest, each times what was learned about it.
     pub(crate) weight: f32,
     /// First light, in tree order.
     pub(crate) first: u32,
@@ -57,25 +55,21 @@ pub(crate) struct Node {
     pub(crate) count: u32,
     /// Index of the first of two children, or [`LEAF`].
     pub(crate) child: u32,
-    /// Index of the parent; the root is its own.
-    pub(crate) parent: u32,
 }
 
 impl Default for Node {
     fn default() -> Self {
         Self {
             center: Vec3::ZERO,
-            radius: 0.0,
+            half: Vec3::ZERO,
             axis: Vec3::Z,
             cos_o: -1.0,
             sin_o: 0.0,
             cos_e: 0.0,
-            flux: 0.0,
             weight: 0.0,
             first: 0,
             count: 0,
             child: LEAF,
-            parent: 0,
         }
     }
 }
@@ -121,14 +115,7 @@ impl Tree {
                 leaves.push(LeafLight::new(light, index, strongest));
             }
         }
-        let mut nodes = build::build(&mut leaves, lights);
-        for parent in 0..nodes.len() {
-            let child = nodes[parent].child;
-            if child != LEAF {
-                nodes[child as usize].parent = parent as u32;
-                nodes[child as usize + 1].parent = parent as u32;
-            }
-        }
+        let nodes = build::build(&mut leaves, lights);
         let mut rank = vec![0; lights.len()];
         let order = leaves
             .iter()

@@ -129,13 +129,16 @@ impl Visibility {
             self.groups[index].0 = evidence.at_most(MAX_SAMPLES_OF_GROUP);
         }
         // Top down: each group's share, with its parent's as the prior.
-        for index in 0..tree.nodes.len() {
-            let prior = if index == 0 {
-                ROOT_VISIBLE
-            } else {
-                self.groups[tree.nodes[index].parent as usize].1
-            };
-            self.groups[index].1 = self.groups[index].0.share(prior);
+        if let Some(root) = self.groups.first_mut() {
+            root.1 = root.0.share(ROOT_VISIBLE);
+        }
+        for (index, node) in tree.nodes.iter().enumerate() {
+            if node.child != LEAF {
+                let prior = self.groups[index].1;
+                for child in &mut self.groups[node.child as usize..][..2] {
+                    child.1 = child.0.share(prior);
+                }
+            }
         }
         let Self {
             seen,
