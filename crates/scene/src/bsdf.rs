@@ -1,5 +1,8 @@
 //! The BSDF: a Lambert lobe under a GGX lobe.
 
+mod albedo;
+
+use albedo::SpecularAlbedo;
 use glam::{Vec2, Vec3};
 use sampling::hemisphere::{Frame, cosine_hemisphere};
 use std::f32::consts::{FRAC_1_PI, PI};
@@ -12,10 +15,10 @@ pub const MIN_ALPHA: f32 = 1e-3;
 ///
 /// The specular lobe is that of appendix B of the glTF 2.0 specification: GGX with height-correlated masking and Schlick's
 /// Fresnel of the half vector; single scattering, so rough metals lose some energy. The diffuse lobe differs: the appendix
-/// weighs it by 1 - F of the half vector, which at grazing angles sends out up to 1.6 times the light that comes in. Here it is
-/// weighed by (1 - F(n.l)) (1 - F(n.v)), scaled so that all that is not reflected specularly reaches it (P. Shirley,
-/// B. Smits, H. Hu, E. Lafortune, "A Practitioners' Assessment of Light Reflection Models", Pacific Graphics 1997, section 4):
-/// reciprocal, never gains, and equal to the appendix for light and view near the normal but for 4 percent.
+/// weighs it by 1 - F of the half vector, which at grazing angles sends out up to 1.6 times the light that comes in. Here it
+/// gets exactly what the specular lobe leaves, (1 - E(n.l)) (1 - E(n.v)) / (1 - mean E) with E the specular lobe's directional
+/// albedo (C. Kelemen and L. Szirmay-Kalos, "A Microfacet Based Coupled Specular-Matte BRDF Model with Importance
+/// Sampling", Eurographics 2001, section 3): reciprocal, never gains, and a white base stays white.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     /// Shading normal on the viewer's side.
@@ -98,11 +101,16 @@ impl Bsdf {
         self.f0 + (Vec3::splat(self.f90) - self.f0) * fifth
     }
 
-    /// Probability of the specular lobe: its share of the albedo from `wo`, a smooth surface assumed. At least 0.1 and at most
-    /// 0.9 while both lobes are there, since masking and tinted light shift the true shares.
+    /// By the largest channel, so that a tinted coat does not tint what is below.
     #[inline]
-    fn specular_probability(&self, fresnel_o: Vec3) -> f32 {
-        let specular = fresnel_o.max_element();
+    fn specular_albedo(&self) -> SpecularAlbedo {
+        SpecularAlbedo::new(self.f0.max_element(), self.f90, self.alpha)
+    }
+
+    /// Probability of the specular lobe: its share of the reflected light, where `specular` is its albedo. At least 0.1 and
+    /// at most 0.9 while both lobes are there: the share holds for uniform light, and lights are not.
+    #[inline]
+    fn specular_probability(&self, specular: f32) -> f32 {
         let diffuse = self.diffuse.max_element() * (1.0 - specular);
         if diffuse <= 0.0 {
             return 1.0;
@@ -127,36 +135,27 @@ impl Bsdf {
         let seen_o = (cos_o * cos_o + alpha_sq * (1.0 - cos_o * cos_o).max(0.0)).sqrt();
         let seen_i = (cos_i * cos_i + alpha_sq * (1.0 - cos_i * cos_i).max(0.0)).sqrt();
         let visibility = 0.5 / (cos_i * seen_o + cos_o * seen_i);
-        let fresnel_o = self.fresnel(cos_o);
         let specular = self.fresnel(wo_ws.dot(half)) * (d * visibility * cos_i);
         let pdf_specular = d / (2.0 * (cos_o + seen_o));
         let lambert = cos_i * FRAC_1_PI;
-        let probability = self.specular_probability(fresnel_o);
+        let albedo = self.specular_albedo();
+        let albedo_o = albedo.at(cos_o);
+        let probability = self.specular_probability(albedo_o);
         let pdf = probability * pdf_specular + (1.0 - probability) * lambert;
-        let diffuse = self.diffuse * (self.coupling(cos_i, fresnel_o) * lambert);
-        (specular + diffuse, pdf)
-    }
-
-    /// Factor of the diffuse lobe: (1 - F(n.l)) (1 - F(n.v)) over the mean of 1 - F on the cosine-weighted hemisphere. By the
-    /// largest channel, so that a tinted coat does not tint what is below.
-    #[inline]
-    fn coupling(&self, cos_i: f32, fresnel_o: Vec3) -> f32 {
-        let f0 = self.f0.max_element();
-        // Schlick's fifth power has the mean 1 / 21.
-        let mean = 1.0 - f0 - (self.f90 - f0) * (1.0 / 21.0);
-        let passing_i = 1.0 - self.fresnel(cos_i).max_element();
-        let passing_o = 1.0 - fresnel_o.max_element();
+        let (passing_o, passing_i, mean) = (1.0 - albedo_o, 1.0 - albedo.at(cos_i), 1.0 - albedo.mean());
         // A mirror lets nothing pass: no share of nothing.
-        if mean > 1e-6 {
+        let coupling = if mean > 1e-6 {
             (passing_i * passing_o).max(0.0) / mean
         } else {
             0.0
-        }
+        };
+        let diffuse = self.diffuse * (coupling * lambert);
+        (specular + diffuse, pdf)
     }
 
     fn sample_layered(&self, frame: &Frame, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let cos_o = self.normal_ws.dot(wo_ws);
-        let wi_ws = if u_lobe < self.specular_probability(self.fresnel(cos_o)) {
+        let wi_ws = if u_lobe < self.specular_probability(self.specular_albedo().at(cos_o)) {
             let wo = frame.to_local(wo_ws);
             let half = sampling::ggx::sample_vndf(wo, self.alpha, u);
             frame.to_world(half * (2.0 * wo.dot(half)) - wo).normalize()
@@ -173,3 +172,6 @@ impl Bsdf {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -60,3 +60,43 @@ impl CameraRays {
         (self.corner_ws + self.step_x_ws * at.x + self.step_y_ws * at.y).normalize()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera() -> Camera {
+        Camera::look_at("c", Vec3::new(1.0, 2.0, 3.0), Vec3::new(4.0, 2.0, -1.0), Vec3::Y, 1.0)
+    }
+
+    #[test]
+    fn the_middle_of_the_image_looks_at_the_target() {
+        let rays = camera().rays(640, 480);
+        assert_eq!(rays.origin_ws, Vec3::new(1.0, 2.0, 3.0));
+        let forward = Vec3::new(3.0, 0.0, -4.0) / 5.0;
+        assert!((rays.direction_ws(Vec2::new(320.0, 240.0)) - forward).length() < 1e-6);
+    }
+
+    #[test]
+    fn up_is_up_and_right_is_right() {
+        let rays = camera().rays(640, 480);
+        let middle = rays.direction_ws(Vec2::new(320.0, 240.0));
+        assert!(rays.direction_ws(Vec2::new(320.0, 0.0)).y > middle.y);
+        let right = rays.direction_ws(Vec2::new(640.0, 240.0)) - middle;
+        assert!(right.dot(middle.cross(Vec3::Y)) > 0.0);
+    }
+
+    #[test]
+    fn the_angle_of_view_is_vertical_whatever_the_aspect() {
+        for width in [100, 480, 2000] {
+            let rays = camera().rays(width, 480);
+            let (x, edges) = (0.5 * width as f32, [0.0, 480.0]);
+            let [top, bottom] = edges.map(|y| rays.direction_ws(Vec2::new(x, y)));
+            assert!((top.angle_between(bottom) - 1.0).abs() < 1e-5);
+            // Square pixels: a pixel to the right is as far as a pixel down.
+            let at = Vec2::new(x, 240.0);
+            let [here, beside, below] = [at, at + Vec2::X, at + Vec2::Y].map(|p| rays.direction_ws(p));
+            assert!((beside.distance(here) / below.distance(here) - 1.0).abs() < 1e-3);
+        }
+    }
+}

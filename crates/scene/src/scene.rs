@@ -309,3 +309,6 @@ fn runs(mesh: &Mesh) -> Vec<u32> {
         .map(|i| i as u32)
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -138,3 +138,6 @@ impl Light {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;
