@@ -1,5 +1,5 @@
-//! Reads every glTF file below the folders or files named on the command line and says what came of each: a check of
-//! the loader against conformance sets and damaged files. Exit code 1 if any file crashed it or took over 5 s.
+//! Loads every glTF file below the folders or files named on the command line and says what came of each: a check of
+//! the reader against conformance sets and damaged files. Exit code 1 if any file crashed it or took over 5 s.
 //!
 //! `cargo run --release -p scene --example load_all -- FOLDER`
 
@@ -16,7 +16,7 @@ fn main() {
     let (mut loaded, mut refused, mut failed) = (0, 0, 0);
     for file in &files {
         let start = Instant::now();
-        let outcome = catch_unwind(|| scene::gltf::read(file));
+        let outcome = catch_unwind(|| scene::load(&file.to_string_lossy()));
         let seconds = start.elapsed().as_secs_f64();
         let line = match outcome {
             Err(_) => {
@@ -27,15 +27,16 @@ fn main() {
                 refused += 1;
                 format!("refused  {error}")
             }
-            Ok(Ok(parts)) => {
+            Ok(Ok(scene)) => {
                 loaded += 1;
-                let triangles: usize = parts.meshes.iter().map(scene::Mesh::len).sum();
+                let parts = &scene.parts;
                 format!(
-                    "loaded   {triangles} triangles, {} meshes, {} instances, {} punctual lights, {} textures, {} cameras; \
+                    "loaded   {} triangles, {} meshes, {} instances, {} lights, {} textures, {} cameras; \
                      ignored {:?}; warnings {:?}",
+                    scene.triangle_count(),
                     parts.meshes.len(),
                     parts.instances.len(),
-                    parts.punctual.len(),
+                    scene.lights.len(),
                     parts.textures.len(),
                     parts.cameras.len(),
                     parts.report.ignored,

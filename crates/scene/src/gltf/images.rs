@@ -5,7 +5,7 @@ use crate::texture::{Texture, Wrap};
 use crate::{Report, SceneError};
 use image::{ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::Cursor;
 
 /// Largest width and height.
@@ -76,6 +76,12 @@ impl Images {
         }
         let next = self.numbers.len() as u32;
         Ok(Some(*self.numbers.entry(key).or_insert(next)))
+    }
+
+    /// How many different images were asked for.
+    pub(super) fn distinct(&self) -> usize {
+        let images: BTreeSet<usize> = self.numbers.keys().map(|key| key.image).collect();
+        images.len()
     }
 
     /// Decodes what was asked for.

@@ -53,6 +53,12 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     let used = used_materials(&source, &placements)?;
     let mut images = images::Images::default();
     let (materials, needs) = materials::read(&source, &used, &mut images, &mut report)?;
+    let unused = source.json.images.len() - images.distinct();
+    if unused > 0 {
+        report
+            .skipped
+            .push(format!("{unused} images that no visible material needs: not decoded"));
+    }
     parts.textures = images.decode(&source)?;
     parts.materials = materials;
     if used.last() == Some(&false) {
@@ -73,7 +79,7 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     parts.punctual = lights::read(&source, &placed, &mut report)?;
     parts.cameras = cameras::read(&source, &placed, &parts, &bounds, &mut report)?;
     parts.report = report;
-    remark(&source, &mut parts);
+    remark(&mut parts);
     Ok(parts)
 }
 
@@ -178,7 +184,7 @@ fn finish_static_mesh(parts: &mut SceneParts) {
 }
 
 /// Notes what is odd about the whole, and what is not there.
-fn remark(source: &Source, parts: &mut SceneParts) {
+fn remark(parts: &mut SceneParts) {
     let degenerate: usize = parts.meshes.iter().map(zero_area_triangles).sum();
     let report = &mut parts.report;
     if degenerate > 0 {
@@ -190,12 +196,6 @@ fn remark(source: &Source, parts: &mut SceneParts) {
     let emitting = |mesh: &Mesh| mesh.materials.iter().any(|&m| parts.materials[m as usize].emits());
     if parts.punctual.is_empty() && !parts.meshes.iter().any(emitting) {
         report.warn("the scene has no lights: the image will be black");
-    }
-    let unused = source.json.images.len().saturating_sub(parts.textures.len());
-    if unused > 0 {
-        report
-            .skipped
-            .push(format!("{unused} images that no visible material needs: not decoded"));
     }
     if !parts.textures.is_empty() && parts.meshes.iter().all(|mesh| mesh.tangents.is_empty()) {
         report.skipped.push("no normal maps: no tangents".into());

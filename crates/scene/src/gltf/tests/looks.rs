@@ -172,6 +172,7 @@ fn textures_are_decoded_once_per_use() {
     assert_eq!((base.width, base.height, base.texels[1]), (2, 1, [0, 0, 128, 255]));
     assert_eq!(parts.meshes[0].uvs.len(), 3);
     assert!(parts.meshes[0].tangents.is_empty() && parts.meshes[0].uvs1.is_empty());
+    assert!(parts.report.skipped.iter().any(|text| text.starts_with("1 images")));
     // An emissive texture on a material that does not emit is no work.
     let dark = textured(json!({ "emissiveTexture": { "index": 1 } }), &["TEXCOORD_0"]);
     assert!(dark.textures.is_empty() && dark.meshes[0].uvs.is_empty());
