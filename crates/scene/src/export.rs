@@ -9,7 +9,7 @@ mod material;
 
 use crate::{LightKind, SceneError, SceneParts};
 use document::{BufferView, Document, LightIndex, Node, NodeExtensions};
-use geometry::Geometry;
+use geometry::{Geometry, Packed};
 use glam::{Affine3A, Quat, Vec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -38,7 +38,13 @@ pub fn write_glb(parts: &SceneParts, path: &Path) -> Result<(), SceneError> {
 }
 
 fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
-    let (nodes, meshes, accessors, mut buffer_views, mut buffer) = Geometry::collect(parts).into_buffer();
+    let Packed {
+        nodes,
+        meshes,
+        accessors,
+        views: mut buffer_views,
+        mut buffer,
+    } = Geometry::collect(parts).into_buffer();
     let mut document = Document {
         nodes,
         meshes,
@@ -50,7 +56,9 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
         let bytes = material::png(texture)?;
         document.textures.push(json!({ "source": index, "sampler": index }));
         document.samplers.push(material::sampler(texture));
-        document.images.push(json!({ "name": texture.name, "mimeType": "image/png", "bufferView": buffer_views.len() }));
+        document
+            .images
+            .push(json!({ "name": texture.name, "mimeType": "image/png", "bufferView": buffer_views.len() }));
         buffer_views.push(BufferView {
             buffer: 0,
             byte_offset: buffer.len() as u64,
@@ -74,8 +82,8 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
     let mut text = serde_json::to_vec(&document)?;
     pad(&mut text, b' ');
     let length = 12 + 8 + text.len() + 8 + buffer.len();
-    let length = u32::try_from(length)
-        .map_err(|_| io::Error::new(io::ErrorKind::FileTooLarge, "a .glb holds at most 4 GiB"))?;
+    let length =
+        u32::try_from(length).map_err(|_| io::Error::new(io::ErrorKind::FileTooLarge, "a .glb holds at most 4 GiB"))?;
     let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes(), kind.as_slice()].concat();
     save(path, |file| {
         file.write_all(b"glTF")?;
@@ -95,7 +103,10 @@ fn pad(bytes: &mut Vec<u8>, with: u8) {
 
 /// Writes a temporary file beside `path` and renames it, so that nobody ever sees half of it.
 fn save(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let mut builder = tempfile::Builder::new();
     builder.prefix(".manylight-").suffix(".glb");
     #[cfg(unix)]
@@ -139,11 +150,21 @@ fn lights<'a>(parts: &'a SceneParts, document: &mut Document<'a>) {
     let mut known: BTreeMap<(&str, [u32; 7]), u32> = BTreeMap::new();
     for (light, source) in &parts.punctual {
         let [r, g, b] = light.intensity.to_array();
-        let numbers = [r, g, b, light.range, light.cos_inner, light.cos_outer, light.kind as u32 as f32];
-        let index = *known.entry((&source.mesh, numbers.map(f32::to_bits))).or_insert_with(|| {
-            records.push(material::light(light, &source.mesh));
-            records.len() as u32 - 1
-        });
+        let numbers = [
+            r,
+            g,
+            b,
+            light.range,
+            light.cos_inner,
+            light.cos_outer,
+            light.kind as u32 as f32,
+        ];
+        let index = *known
+            .entry((&source.mesh, numbers.map(f32::to_bits)))
+            .or_insert_with(|| {
+                records.push(material::light(light, &source.mesh));
+                records.len() as u32 - 1
+            });
         let node = match light.kind {
             LightKind::Point | LightKind::Triangle => Node {
                 translation: Some(light.position_ws.to_array()),
@@ -169,6 +190,17 @@ fn lights<'a>(parts: &'a SceneParts, document: &mut Document<'a>) {
 
 /// The extensions that the document uses, found by their names in what few JSON values may use them.
 fn extensions_used(document: &Document) -> Vec<&'static str> {
-    let text: String = document.materials.iter().chain(&document.extensions).map(Value::to_string).collect();
-    EXTENSIONS.into_iter().filter(|name| text.contains(&format!("\"{name}\":"))).collect()
+    let text: String = document
+        .materials
+        .iter()
+        .chain(&document.extensions)
+        .map(Value::to_string)
+        .collect();
+    EXTENSIONS
+        .into_iter()
+        .filter(|name| text.contains(&format!("\"{name}\":")))
+        .collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,15 +15,24 @@ const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 /// The buffer's streams, each of which becomes one buffer view, and the accessors into them.
 #[derive(Default)]
 pub(super) struct Geometry<'a> {
-    pub(super) nodes: Vec<Node<'a>>,
-    pub(super) meshes: Vec<MeshEntry<'a>>,
-    pub(super) accessors: Vec<Accessor>,
+    nodes: Vec<Node<'a>>,
+    meshes: Vec<MeshEntry<'a>>,
+    accessors: Vec<Accessor>,
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     uvs: Vec<Vec2>,
     tangents: Vec<Vec4>,
     colors: Vec<Vec4>,
     indices: Vec<u32>,
+}
+
+/// What goes into the file.
+pub(super) struct Packed<'a> {
+    pub(super) nodes: Vec<Node<'a>>,
+    pub(super) meshes: Vec<MeshEntry<'a>>,
+    pub(super) accessors: Vec<Accessor>,
+    pub(super) views: Vec<BufferView>,
+    pub(super) buffer: Vec<u8>,
 }
 
 /// Which buffer view a stream is.
@@ -82,9 +91,17 @@ impl<'a> Geometry<'a> {
         if instances.is_empty() {
             return;
         }
-        self.mesh(mesh, &mesh.name, &grouped(mesh, |_| 0), &mut VertexMap::new(mesh.positions.len()));
+        self.mesh(
+            mesh,
+            &mesh.name,
+            &grouped(mesh, |_| 0),
+            &mut VertexMap::new(mesh.positions.len()),
+        );
         for instance in instances {
-            let name = parts.origins.get(instance.origin as usize).map_or("", |origin| &origin.0);
+            let name = parts
+                .origins
+                .get(instance.origin as usize)
+                .map_or("", |origin| &origin.0);
             self.node(name, instance);
         }
     }
@@ -108,7 +125,14 @@ impl<'a> Geometry<'a> {
         self.meshes.push(MeshEntry { name, primitives });
     }
 
-    fn primitive(&mut self, mesh: &Mesh, material: u32, smooth: bool, triangles: &[u32], map: &mut VertexMap) -> Primitive {
+    fn primitive(
+        &mut self,
+        mesh: &Mesh,
+        material: u32,
+        smooth: bool,
+        triangles: &[u32],
+        map: &mut VertexMap,
+    ) -> Primitive {
         let first_index = self.indices.len();
         let corners = triangles.iter().flat_map(|&i| mesh.indices[i as usize]);
         map.renumber(corners, &mut self.indices);
@@ -129,7 +153,9 @@ impl<'a> Geometry<'a> {
 
         let (low, high) = self.positions[first..]
             .iter()
-            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)));
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
+                (low.min(p), high.max(p))
+            });
         let position = self.accessor(Stream::Positions, first, count);
         let bounded = &mut self.accessors[position as usize];
         bounded.min = Some(low.to_array());
@@ -171,7 +197,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// The bytes of the streams in the order of their buffer views; empty ones are dropped and the accessors follow.
-    pub(super) fn into_buffer(mut self) -> (Vec<Node<'a>>, Vec<MeshEntry<'a>>, Vec<Accessor>, Vec<BufferView>, Vec<u8>) {
+    pub(super) fn into_buffer(mut self) -> Packed<'a> {
         use bytemuck::cast_slice;
         let streams: [(&[u8], u32); 6] = [
             (cast_slice(&self.positions), 12),
@@ -202,7 +228,13 @@ impl<'a> Geometry<'a> {
         for accessor in &mut self.accessors {
             accessor.buffer_view = view_of_stream[accessor.buffer_view as usize];
         }
-        (self.nodes, self.meshes, self.accessors, views, buffer)
+        Packed {
+            nodes: self.nodes,
+            meshes: self.meshes,
+            accessors: self.accessors,
+            views,
+            buffer,
+        }
     }
 }
 
@@ -210,12 +242,16 @@ impl<'a> Geometry<'a> {
 fn grouped(mesh: &Mesh, part: impl Fn(usize) -> u32) -> Vec<(Group, Vec<u32>)> {
     let key = |i: u32| {
         let at = i as usize;
-        let smooth = !mesh.normals.is_empty() && mesh.indices[at].iter().all(|&v| mesh.normals[v as usize] != Vec3::ZERO);
+        let smooth =
+            !mesh.normals.is_empty() && mesh.indices[at].iter().all(|&v| mesh.normals[v as usize] != Vec3::ZERO);
         (part(at), mesh.materials[at], smooth)
     };
     let mut order: Vec<u32> = (0..mesh.len() as u32).collect();
     order.sort_by_key(|&i| key(i));
-    order.chunk_by(|&a, &b| key(a) == key(b)).map(|run| (key(run[0]), run.to_vec())).collect()
+    order
+        .chunk_by(|&a, &b| key(a) == key(b))
+        .map(|run| (key(run[0]), run.to_vec()))
+        .collect()
 }
 
 /// Renumbers the vertices of one primitive after another.

@@ -23,7 +23,11 @@ fn texture_ref(at: &TextureRef) -> Map<String, Value> {
         let (x, y) = (at.columns.x_axis, at.columns.y_axis);
         let rotation = (-x.y).atan2(x.x);
         let scale_x = x.length();
-        let scale_y = if scale_x > 0.0 { at.columns.determinant() / scale_x } else { y.length() };
+        let scale_y = if scale_x > 0.0 {
+            at.columns.determinant() / scale_x
+        } else {
+            y.length()
+        };
         let transform = json!({
             "offset": at.offset.to_array(), "rotation": rotation, "scale": [scale_x, scale_y], "texCoord": at.uv_set,
         });
@@ -51,7 +55,10 @@ pub(super) fn material(m: &Material) -> Value {
         let (factor, strength) = factor_and_strength(m.emission);
         out["emissiveFactor"] = json!(factor);
         if strength != 1.0 {
-            extensions.insert("KHR_materials_emissive_strength".into(), json!({ "emissiveStrength": strength }));
+            extensions.insert(
+                "KHR_materials_emissive_strength".into(),
+                json!({ "emissiveStrength": strength }),
+            );
         }
     }
     if let Some(at) = &m.emissive_texture {
@@ -89,7 +96,10 @@ fn specular(m: &Material, extensions: &mut Map<String, Value>) {
     }
     if (strongest - 0.04).abs() > 1e-6 {
         let root = strongest.sqrt();
-        extensions.insert("KHR_materials_ior".into(), json!({ "ior": (1.0 + root) / (1.0 - root) }));
+        extensions.insert(
+            "KHR_materials_ior".into(),
+            json!({ "ior": (1.0 + root) / (1.0 - root) }),
+        );
     }
     if !specular.is_empty() {
         extensions.insert("KHR_materials_specular".into(), specular.into());
@@ -113,7 +123,10 @@ pub(super) fn light(light: &Light, name: &str) -> Value {
         out["range"] = json!(light.range);
     }
     if light.kind == LightKind::Spot {
-        let (inner, outer) = (light.cos_inner.clamp(-1.0, 1.0).acos(), light.cos_outer.clamp(-1.0, 1.0).acos());
+        let (inner, outer) = (
+            light.cos_inner.clamp(-1.0, 1.0).acos(),
+            light.cos_outer.clamp(-1.0, 1.0).acos(),
+        );
         out["spot"] = json!({ "innerConeAngle": inner, "outerConeAngle": outer });
     }
     out

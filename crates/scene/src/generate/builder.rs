@@ -2,7 +2,7 @@
 
 use super::dice::sin_cos;
 use crate::{Camera, Instance, Light, LightKind, LightSource, Material, Mesh, PrimitiveId, SceneParts, luminance};
-use glam::{Affine3A, Mat3A, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
 
@@ -319,6 +319,7 @@ impl Builder {
     }
 
     /// Lights so far: emissive triangles and point lights.
+    #[cfg(test)]
     pub(super) fn light_count(&self) -> usize {
         self.emissive_triangles + self.parts.punctual.len()
     }
@@ -351,14 +352,7 @@ impl Builder {
     pub(super) fn finish(self) -> SceneParts {
         let mut parts = self.parts;
         parts.meshes.push(self.mesh);
-        parts.instances.push(Instance {
-            mesh: 0,
-            origin: 0,
-            world_from_local: Affine3A::IDENTITY,
-            local_from_world: Affine3A::IDENTITY,
-            world_normal_from_local: Mat3A::IDENTITY,
-            identity: true,
-        });
+        parts.instances.push(Instance::identity(0, 0));
         parts
     }
 }

@@ -189,8 +189,7 @@ fn pendants(
 fn sconces(b: &mut Builder, p: &Palette, spots: &Spots, lights: usize, flux: Vec3, source: Source) {
     let room = spots.room;
     let lamps = (lights / 4).clamp(1, 4).min(lights);
-    for i in 0..lamps {
-        let side = SIDES[i];
+    for (i, side) in SIDES.into_iter().enumerate().take(lamps) {
         let length = room.length(side);
         let along = match room.opening(side) {
             Some(door) if door.center > 0.5 * length => 0.5 * (door.center - 0.5 * door.width),

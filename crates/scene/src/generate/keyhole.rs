@@ -15,11 +15,11 @@ use glam::Vec3;
 
 /// The doorway to the dark room. The leaf stands open by `LEAF_TURNS` whole turns.
 const DOOR: Opening = Opening {
-    center: 3.1,
+    center: 1.9,
     width: 1.0,
     height: 2.1,
 };
-const LEAF_TURNS: f32 = 0.055;
+const LEAF_TURNS: f32 = 0.06;
 
 /// Makes it: a tenth of the lights in either hidden room, the others in the bright one.
 pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
@@ -74,19 +74,27 @@ pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
 
     let hidden = share(lights, 10, 0).max(1);
     for (index, lights, kind, color, irradiance) in [
-        (0, lights - 2 * hidden, Kind::Gallery, NEUTRAL, 260.0),
+        (0, lights - 2 * hidden, Kind::Gallery, NEUTRAL, 500.0),
         (1, hidden, Kind::Dining, WARM, 40.0),
         (3, hidden, Kind::Library, COOL, 40.0),
     ] {
         let mut dice = Dice::new(&[seed, 31, index as u32]);
         let spots = furnish(&mut b, &mut dice, &p, &plan.rooms[index], index, kind);
-        light(&mut b, &mut dice, &p, &spots, Mood { color, irradiance }, lights, Source::Panels);
+        light(
+            &mut b,
+            &mut dice,
+            &p,
+            &spots,
+            Mood { color, irradiance },
+            lights,
+            Source::Panels,
+        );
     }
     let dark = &plan.rooms[2];
     furnish_dark(&mut b, &mut Dice::new(&[seed, 32]), &p, dark);
     b.place_in_world();
-    let eye = Vec3::new(dark.low.x + 0.55, 1.5, dark.high.z - 0.35);
-    let target = Vec3::new(dark.low.x + 3.1, 0.85, dark.low.z + 0.6);
+    let eye = Vec3::new(dark.high.x - 0.5, 1.5, dark.high.z - 0.35);
+    let target = Vec3::new(dark.low.x + 2.5, 0.8, dark.low.z + 0.6);
     b.camera("dark room", eye, target, 0.95);
     b.finish()
 }
@@ -103,8 +111,18 @@ fn leaf(b: &mut Builder, p: &Palette) {
         b.cuboid([0.15, low, -0.028], [width - 0.15, high, 0.028], paint);
     }
     for side in [-1.0, 1.0] {
-        b.bar(Vec3::new(width - 0.07, 1.02, 0.0), Vec3::new(width - 0.07, 1.02, 0.065 * side), 0.02, p.brass);
-        b.bar(Vec3::new(width - 0.06, 1.02, 0.06 * side), Vec3::new(width - 0.2, 1.02, 0.06 * side), 0.018, p.brass);
+        b.bar(
+            Vec3::new(width - 0.07, 1.02, 0.0),
+            Vec3::new(width - 0.07, 1.02, 0.065 * side),
+            0.02,
+            p.brass,
+        );
+        b.bar(
+            Vec3::new(width - 0.06, 1.02, 0.06 * side),
+            Vec3::new(width - 0.2, 1.02, 0.06 * side),
+            0.018,
+            p.brass,
+        );
     }
 }
 
@@ -115,20 +133,20 @@ fn furnish_dark(b: &mut Builder, dice: &mut Dice, p: &Palette, room: &Room) {
         b.begin(format!("dark room / {name}"), name);
         b.place(pose);
     };
-    place(b, "rug", Pose::new(at(3.3, 2.5), 0.0));
+    place(b, "rug", Pose::new(at(3.1, 2.3), 0.0));
     piece::rug(b, [1.5, 1.15], p.linen, p.fabric[3]);
-    place(b, "table", Pose::new(at(3.5, 2.6) + Vec3::Y * 0.011, 0.0));
+    place(b, "table", Pose::new(at(3.75, 2.0) + Vec3::Y * 0.011, 0.0));
     piece::round_table(b, 0.5, 0.6, p.oak, p.dark);
     piece::vase(b, Vec3::new(-0.1, 0.6, -0.1), 0.34, p.white);
     b.ball(Vec3::new(0.22, 0.6 + 0.095, 0.06), 0.1, 24, p.fabric[1]);
-    place(b, "armchair", Pose::new(at(5.1, 3.5), 0.58));
+    place(b, "armchair", Pose::new(at(0.95, 2.9), 0.2));
     piece::sofa(b, dice, p, 1.05, p.fabric[0]);
-    place(b, "chair", Pose::new(at(2.3, 2.2), 0.2));
+    place(b, "chair", Pose::new(at(2.75, 2.95), 0.15));
     piece::chair(b, p.walnut, p.fabric[1]);
-    place(b, "shelf", room.at_wall(Side::PosX, 2.0));
-    piece::shelf(b, dice, p, [1.8, 2.0], p.oak, 0.75);
-    place(b, "plant", Pose::new(at(4.9, 0.6), 0.0));
+    place(b, "shelf", room.at_wall(Side::NegX, 1.6));
+    piece::shelf(b, dice, p, [1.6, 2.0], p.oak, 0.75);
+    place(b, "plant", Pose::new(at(5.0, 0.5), 0.0));
     piece::plant(b, dice, p, 1.5, 20);
-    place(b, "painting", room.at_wall(Side::NegZ, 1.2));
+    place(b, "painting", room.at_wall(Side::NegZ, 3.6));
     piece::painting(b, dice, p, [0.9, 1.1]);
 }

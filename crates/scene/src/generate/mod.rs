@@ -123,3 +123,6 @@ pub fn demo(what: &str) -> Result<SceneParts, SceneError> {
     }
     Ok((family.make)(lights, seed))
 }
+
+#[cfg(test)]
+mod tests;

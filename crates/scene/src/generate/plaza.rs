@@ -113,7 +113,7 @@ fn lantern(b: &mut Builder, p: &Palette, i: usize, [x, z]: [f32; 2], lit: bool) 
     }
     let (half, low, high, front) = (0.13, 3.52, 3.88, 0.152);
     let area = 4.0 * 2.0 * half * (high - low);
-    let paint = b.emitter("lantern light", GLOW[1] * (320.0 / (PI * area)));
+    let paint = b.emitter("lantern light", GLOW[1] * (400.0 / (PI * area)));
     for side in 0..4 {
         let (sin, cos) = sin_cos(0.25 * side as f32);
         let at = |u: f32, y: f32| Vec3::new(cos * u + sin * front, y, -sin * u + cos * front);
@@ -185,13 +185,13 @@ impl String {
             b.bar(from, to, 0.012, p.dark);
         }
         // Fewer bulbs are bigger ones; powers of one string vary by what bulbs of one box vary.
-        let crowd = (60.0 / bulbs.max(1) as f32).clamp(0.1, 4.0);
+        let crowd = (60.0 / bulbs.max(1) as f32).clamp(0.1, 2.0);
         for k in 0..bulbs {
             let at = self.at((k + 1) as f32 / (bulbs + 1) as f32);
             let tint = GLOW[if mixed { (color + k) % GLOW.len() } else { color }];
             let step = dice.below(7);
-            let power = exp10(-0.6 + 0.25 * step as f32) * crowd * 2.2;
-            let radius = 0.035 + 0.006 * step as f32 * crowd.min(2.0);
+            let power = exp10(-1.3 + 0.38 * step as f32) * crowd * 2.2;
+            let radius = 0.026 + 0.004 * step as f32;
             // Surface of a regular octahedron: 4 sqrt(3) r^2.
             let paint = b.emitter(
                 "bulb light",

@@ -47,14 +47,20 @@ pub(super) fn spheres(lights: usize, seed: u32) -> SceneParts {
             b.ellipsoid(center, Vec3::splat(RADIUS), 72, 36, paint);
         }
     }
-    lamps(&mut b, &mut dice, lights);
-    b.camera("front", Vec3::new(0.0, 2.9, 7.4), Vec3::new(0.0, 1.02, 0.0), 0.66);
+    let low = lights / 5;
+    lamps(&mut b, &mut dice, lights - low);
+    footlights(&mut b, low);
+    b.camera("front", Vec3::new(0.0, 3.0, 8.2), Vec3::new(0.0, 0.98, 0.0), 0.66);
     b.finish()
 }
 
 fn ball_paint(b: &mut Builder, row: usize, roughness: f32) -> Paint {
     match row {
-        0 => b.glazed(&format!("blue glaze, roughness {roughness}"), [0.06, 0.17, 0.42], roughness),
+        0 => b.glazed(
+            &format!("blue glaze, roughness {roughness}"),
+            [0.06, 0.17, 0.42],
+            roughness,
+        ),
         1 => b.metal(&format!("gold, roughness {roughness}"), [1.0, 0.77, 0.34], roughness),
         _ => b.metal(&format!("steel, roughness {roughness}"), [0.78, 0.79, 0.81], roughness),
     }
@@ -65,7 +71,7 @@ fn lamps(b: &mut Builder, dice: &mut Dice, lights: usize) {
     let housing = b.lambert("housing", [0.05, 0.05, 0.055]);
     let count = (lights / 4).clamp(4, 28);
     let columns = 7;
-    let flux = 560.0 / count as f32;
+    let flux = 1500.0 / count as f32;
     for i in 0..count {
         // Spread over the grid whatever their number.
         let cell = i * 28 / count;
@@ -87,5 +93,31 @@ fn lamps(b: &mut Builder, dice: &mut Dice, lights: usize) {
         };
         let color = COLORS[(column + 2 * row + dice.below(2)) % COLORS.len()];
         fixture.build(b, Source::Panels, share(lights, count, i), color * flux, "lamp light");
+    }
+}
+
+/// Small lamps along the edge of the stage that shine up, so that the undersides of the balls have something to mirror.
+fn footlights(b: &mut Builder, lights: usize) {
+    let housing = b.lambert("housing", [0.05, 0.05, 0.055]);
+    let count = (lights / 2).clamp(1, 14);
+    for i in 0..count {
+        // Nine before the lowest step, the others beside it, the middle first.
+        let reach = i.div_ceil(2) as f32 * if i % 2 == 0 { 1.0 } else { -1.0 };
+        let at = if i < 9 {
+            Vec3::new(0.86 * reach, 0.0, 2.5)
+        } else {
+            let side = if i % 2 == 0 { 1.0 } else { -1.0 };
+            Vec3::new(4.1 * side, 0.0, 1.6 - 1.1 * ((i - 9) / 2) as f32)
+        };
+        b.begin(format!("footlight {i}"), "footlight");
+        let fixture = Lamp {
+            bottom_center: at - Vec3::Y * 0.01,
+            half: if i < 9 { [0.3, 0.05] } else { [0.05, 0.3] },
+            height: 0.09,
+            housing,
+            up: true,
+        };
+        let color = COLORS[(5 * i + 1) % COLORS.len()];
+        fixture.build(b, Source::Panels, share(lights, count, i), color * 9.0, "footlight");
     }
 }
