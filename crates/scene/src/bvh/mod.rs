@@ -21,8 +21,6 @@ use glam::Vec3;
 pub use kernel::Kernel;
 #[cfg(target_arch = "x86_64")]
 use kernel::avx2::Avx2;
-#[cfg(target_arch = "x86_64")]
-use kernel::avx512::Avx512;
 use kernel::portable::Portable;
 use node::Node;
 use pack::Pack;
@@ -125,7 +123,9 @@ impl Bvh {
             bvh.placed.push(Placed { instance: 0, root: 0 });
             let tree = bvh2::build(&boxes);
             let empty = boxes.len() as u32;
-            bvh.top = collapse::collapse(&tree, 1, empty, &mut bvh.nodes, |instances| instances[0]);
+            bvh.top = Some(collapse::collapse(&tree, 1, empty, &mut bvh.nodes, |instances| {
+                instances[0]
+            }));
         }
         bvh.nodes.shrink_to_fit();
         bvh.packs.shrink_to_fit();
@@ -152,7 +152,7 @@ impl Bvh {
             let triangles = boxes.iter().map(|&index| triangles[index as usize]);
             packs.push(Pack::new(mesh, &parts.materials, triangles));
             packs.len() as u32 - 1
-        })?;
+        });
         Some((root, boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b))))
     }
 
@@ -266,7 +266,7 @@ compile!(avx2, Avx2, "avx2,fma,bmi1,bmi2,lzcnt");
 #[cfg(target_arch = "x86_64")]
 compile!(
     avx512,
-    Avx512,
+    Avx2,
     "avx512f,avx512vl,avx512dq,avx512bw,avx2,fma,bmi1,bmi2,lzcnt"
 );
 

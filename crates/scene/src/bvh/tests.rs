@@ -244,3 +244,173 @@ fn empty_and_degenerate_scenes_are_never_hit() {
         }
     }
 }
+
+/// Every ray from inside a closed mesh must hit it, those through edges and corners too.
+#[test]
+fn closed_meshes_do_not_leak() {
+    let mut numbers = Numbers(5);
+    let (columns, rows) = (64u32, 32u32);
+    let point = |column: u32, row: u32| {
+        let theta = std::f32::consts::PI * row as f32 / rows as f32;
+        let phi = std::f32::consts::TAU * (column % columns) as f32 / columns as f32;
+        let around = if row == 0 || row == rows { 0.0 } else { theta.sin() };
+        Vec3::new(around * phi.cos(), theta.cos(), around * phi.sin())
+    };
+    let mut sphere = Vec::new();
+    for row in 0..rows {
+        for column in 0..columns {
+            let [a, b, c, d] = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(i, j)| point(column + i, row + j));
+            sphere.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let corner = |i: usize| Vec3::new((i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2 & 1) as f32) * 2.0 - 1.0;
+    let mut cube = Vec::new();
+    for [a, b, c, d] in [
+        [0, 4, 6, 2],
+        [1, 3, 7, 5],
+        [0, 1, 5, 4],
+        [2, 6, 7, 3],
+        [0, 2, 3, 1],
+        [4, 5, 7, 6],
+    ] {
+        let [a, b, c, d] = [a, b, c, d].map(corner);
+        cube.extend([[a, b, c], [a, c, d]]);
+    }
+    for (mesh, scale, rays) in [(&sphere, 1.0, 200_000), (&cube, 1e-4, 100_000), (&cube, 1e5, 100_000)] {
+        let offset = Vec3::new(0.3, 5.0, -0.7) * scale;
+        let moved: Vec<_> = mesh.iter().map(|t| t.map(|p| p * scale + offset)).collect();
+        let parts = static_scene(&moved);
+        let mut bvh = Bvh::build(&parts);
+        for kernel in Kernel::available() {
+            bvh.set_kernel(kernel);
+            for i in 0..rays {
+                let origin_ws = numbers.point() * (0.5 * scale) + offset;
+                // Every second ray goes through a corner or a point on an edge.
+                let direction_ws = if i % 2 == 0 {
+                    numbers.direction()
+                } else {
+                    let triangle = moved[(numbers.unit() * moved.len() as f32) as usize];
+                    let along = if i % 4 == 1 { 0.0 } else { numbers.unit() };
+                    (triangle[0] + (triangle[1] - triangle[0]) * along - origin_ws).normalize()
+                };
+                let ray = Ray {
+                    origin_ws,
+                    direction_ws,
+                    t_max: f32::INFINITY,
+                };
+                let none = PrimitiveId::NONE;
+                assert!(bvh.nearest(&parts, &ray, none).is_some(), "{kernel:?} leaks {ray:?}");
+                assert!(bvh.occluded(&parts, &ray, none, none), "{kernel:?} leaks {ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn axis_aligned_rays_hit_axis_aligned_walls() {
+    for scale in [1e-4f32, 1.0, 1e5] {
+        let wall = |x: f32| {
+            let [a, b, c, d] =
+                [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(y, z)| Vec3::new(x, y, z) * scale);
+            [[a, b, c], [a, c, d]]
+        };
+        // The wall at 2 is there twice, coplanar.
+        let parts = static_scene(&[wall(1.0), wall(2.0), wall(2.0)].concat());
+        let mut bvh = Bvh::build(&parts);
+        for kernel in Kernel::available() {
+            bvh.set_kernel(kernel);
+            for (y, z) in [(0.0, 0.0), (0.5, 0.5), (1.0, 0.25), (-1.0, -1.0), (-0.25, 0.75)] {
+                let none = PrimitiveId::NONE;
+                let ray = |x: f32, sign: f32, t_max: f32| Ray {
+                    origin_ws: Vec3::new(x, y, z) * scale,
+                    direction_ws: Vec3::new(sign, -0.0, 0.0),
+                    t_max: t_max * scale,
+                };
+                let t = |ray: &Ray| bvh.nearest(&parts, ray, none).map(|hit| hit.t / scale);
+                let close = |t: Option<f32>, to: f32| t.is_some_and(|t| (t - to).abs() < 1e-5);
+                assert!(close(t(&ray(0.0, 1.0, f32::INFINITY)), 1.0));
+                assert!(close(t(&ray(3.0, -1.0, f32::INFINITY)), 1.0));
+                assert!(close(t(&ray(1.5, 1.0, 10.0)), 0.5));
+                assert!(t(&ray(0.0, 1.0, 0.99)).is_none());
+                assert!(t(&ray(0.0, -1.0, f32::INFINITY)).is_none());
+                assert!(!bvh.occluded(&parts, &ray(0.0, 1.0, 0.99), none, none));
+                assert!(bvh.occluded(&parts, &ray(0.0, 1.0, 1.01), none, none));
+            }
+        }
+    }
+}
+
+#[test]
+fn alpha_below_the_cutoff_is_not_there() {
+    let mut numbers = Numbers(6);
+    let mut parts = static_scene(&soup(&mut numbers, 800, 0.4));
+    let mut cut_out = Material::lambert("", Vec3::ONE);
+    cut_out.alpha_cutoff = Some(0.5);
+    parts.materials.push(cut_out);
+    parts.meshes[0]
+        .materials
+        .iter_mut()
+        .step_by(2)
+        .for_each(|material| *material = 1);
+    // The vertex alpha runs from 1 at the first corner to 0 at the others.
+    let alpha = (0..2_400).map(|i| glam::Vec4::new(1.0, 1.0, 1.0, if i % 3 == 0 { 1.0 } else { 0.0 }));
+    parts.meshes[0].colors = alpha.collect();
+    let mut bvh = Bvh::build(&parts);
+    let (mut through, none) = (0, PrimitiveId::NONE);
+    for i in 0..2_000 {
+        let kernels = Kernel::available();
+        bvh.set_kernel(kernels[i % kernels.len()]);
+        let ray = Ray {
+            t_max: f32::INFINITY,
+            ..random_ray(&mut numbers)
+        };
+        let exact = all_hits(&parts, &ray);
+        let Some(hit) = bvh.nearest(&parts, &ray, none) else {
+            assert!(exact.iter().all(|e| e.2.triangle % 2 == 0 || e.1 < 1e-3));
+            continue;
+        };
+        assert!(hit.id.triangle % 2 == 1 || 1.0 - hit.u - hit.v >= 0.5);
+        let before = |e: &&(f64, f64, PrimitiveId)| e.0 < f64::from(hit.t) * (1.0 - 1e-4) && e.1 > 1e-3;
+        assert!(exact.iter().filter(before).all(|e| e.2.triangle % 2 == 0));
+        through += usize::from(exact.iter().any(|e| before(&e)));
+        let short = Ray {
+            t_max: hit.t * 0.999,
+            ..ray
+        };
+        assert!(!bvh.occluded(&parts, &short, none, none));
+    }
+    assert!(through > 100, "{through}");
+}
+
+/// Sizes that grow by a factor make the deepest trees; coincident and huge triangles the worst clusters.
+#[test]
+fn awkward_geometry_builds_and_is_hit() {
+    let triangle = |size: f32| {
+        [
+            Vec3::new(-1.0, -1.0, 1.0),
+            Vec3::new(1.0, -1.0, 1.0),
+            Vec3::new(0.0, 1.0, 1.0),
+        ]
+        .map(|p| p * size)
+    };
+    let nested: Vec<_> = (0..200).map(|i| triangle(1.3f32.powi(i - 100))).collect();
+    let coincident = vec![triangle(1.0); 5_000];
+    let huge = vec![triangle(1e12), triangle(1.0), triangle(1e-12)];
+    for triangles in [nested, coincident, huge] {
+        let nearest = triangles.iter().map(|t| t[0].z).fold(f32::INFINITY, f32::min);
+        let parts = static_scene(&triangles);
+        let mut bvh = Bvh::build(&parts);
+        for kernel in Kernel::available() {
+            bvh.set_kernel(kernel);
+            let ray = Ray {
+                origin_ws: Vec3::ZERO,
+                direction_ws: Vec3::Z,
+                t_max: f32::INFINITY,
+            };
+            let hit = bvh
+                .nearest(&parts, &ray, PrimitiveId::NONE)
+                .expect("all of them lie ahead");
+            assert!((hit.t - nearest).abs() <= 1e-6 * nearest);
+        }
+    }
+}

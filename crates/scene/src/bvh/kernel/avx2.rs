@@ -3,7 +3,7 @@
 use super::{Instructions, LocalRay, Node, Pack, PackHits, WIDTH};
 use std::arch::x86_64::*;
 
-/// See [`Instructions`].
+/// Eight lanes of AVX2; see [`Instructions`].
 pub(in super::super) struct Avx2;
 
 /// A ray's constants for the box test.
@@ -31,16 +31,13 @@ impl Instructions for Avx2 {
     #[inline]
     #[target_feature(enable = "avx2,fma")]
     unsafe fn ray(ray: &LocalRay) -> Ray {
-        // SAFETY: the caller knows that the processor has the instructions.
-        unsafe {
-            let all = |x: [f32; 3]| [_mm256_set1_ps(x[0]), _mm256_set1_ps(x[1]), _mm256_set1_ps(x[2])];
-            Ray {
-                origin: all(ray.origin),
-                inverse: all(ray.inverse),
-                inverse_far: all(ray.inverse_far),
-                near: ray.near,
-                shape: sheared(ray),
-            }
+        let all = |x: [f32; 3]| [_mm256_set1_ps(x[0]), _mm256_set1_ps(x[1]), _mm256_set1_ps(x[2])];
+        Ray {
+            origin: all(ray.origin),
+            inverse: all(ray.inverse),
+            inverse_far: all(ray.inverse_far),
+            near: ray.near,
+            shape: sheared(ray),
         }
     }
 
@@ -85,21 +82,17 @@ impl Instructions for Avx2 {
 }
 
 /// Fills registers for [`triangles`].
-#[allow(unsafe_code, reason = "vector instructions")]
 #[inline]
 #[target_feature(enable = "avx2,fma")]
-pub(super) unsafe fn sheared(ray: &LocalRay) -> ShearedRay {
-    // SAFETY: the caller knows that the processor has the instructions.
-    unsafe {
-        ShearedRay {
-            origin: ray.axes.map(|axis| _mm256_set1_ps(ray.origin[axis])),
-            shear: [
-                _mm256_set1_ps(ray.shear[0]),
-                _mm256_set1_ps(ray.shear[1]),
-                _mm256_set1_ps(ray.shear[2]),
-            ],
-            axes: ray.axes,
-        }
+pub(super) fn sheared(ray: &LocalRay) -> ShearedRay {
+    ShearedRay {
+        origin: ray.axes.map(|axis| _mm256_set1_ps(ray.origin[axis])),
+        shear: [
+            _mm256_set1_ps(ray.shear[0]),
+            _mm256_set1_ps(ray.shear[1]),
+            _mm256_set1_ps(ray.shear[2]),
+        ],
+        axes: ray.axes,
     }
 }
 
