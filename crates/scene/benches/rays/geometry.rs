@@ -5,10 +5,10 @@ use scene::{Instance, Material, Mesh, SceneParts};
 use std::f32::consts::{PI, TAU};
 
 /// SplitMix64.
-pub struct Numbers(pub u64);
+pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {
-    pub fn unit(&mut self) -> f32 {
+    pub(crate) fn unit(&mut self) -> f32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -17,7 +17,7 @@ impl Numbers {
     }
 
     /// Uniform on the unit sphere.
-    pub fn direction(&mut self) -> Vec3 {
+    pub(crate) fn direction(&mut self) -> Vec3 {
         let z = 1.0 - 2.0 * self.unit();
         let phi = TAU * self.unit();
         let r = (1.0 - z * z).max(0.0).sqrt();
@@ -28,7 +28,7 @@ impl Numbers {
 type Triangles = Vec<[Vec3; 3]>;
 
 /// `box`: 30 triangles; `rooms`: 30 thousand; `bumps`: a million.
-pub fn build_parts(name: &str) -> Option<SceneParts> {
+pub(crate) fn build_parts(name: &str) -> Option<SceneParts> {
     let triangles = match name {
         "box" => small_box(),
         "rooms" => rooms(),

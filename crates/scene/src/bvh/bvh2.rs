@@ -8,7 +8,7 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Share of the nodes that reinsertion tries to place better. Higher values build slower and trace faster.
-const REINSERTION_SHARE: f32 = 0.15;
+const REINSERTION_SHARE: f32 = 0.3;
 
 /// PLOC (Meister and Bittner 2018), then parallel reinsertion (Meister and Bittner 2018). Every leaf holds one box, and
 /// `primitive_indices[first_index]` is its index in `boxes`.

@@ -8,7 +8,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 
 /// Cost of testing a pack of triangles, in tests of a node. Higher values give fuller packs.
-const LEAF_COST: f32 = 0.8;
+const LEAF_COST: f32 = 1.2;
 
 /// Depth from which subtrees are cut without regard to cost. Only adversarial geometry gets there.
 const DEEP: usize = 80;

@@ -146,14 +146,16 @@ impl Bvh {
             .iter()
             .map(|&triangle| Bounds::of_triangle(mesh.corners(triangle as usize)))
             .collect();
+        let around = boxes.iter().fold(Bounds::EMPTY, |around, b| around.union(*b));
         let tree = bvh2::build(&boxes);
+        drop(boxes);
         let packs = &mut self.packs;
         let root = collapse::collapse(&tree, node::WIDTH as u32, 0, &mut self.nodes, |boxes| {
             let triangles = boxes.iter().map(|&index| triangles[index as usize]);
             packs.push(Pack::new(mesh, &parts.materials, triangles));
             packs.len() as u32 - 1
         });
-        Some((root, boxes.iter().fold(Bounds::EMPTY, |all, b| all.union(*b))))
+        Some((root, around))
     }
 
     /// The nearest hit, or `None`. `from` is skipped (the triangle the ray starts on).
