@@ -29,6 +29,6 @@ pub fn build<V: Visitor>(scene: &Scene, settings: &Settings, kind: SamplerKind, 
         SamplerKind::Octree => visitor.visit(OctreeSampler::new(scene, settings)),
         SamplerKind::Tree => visitor.visit(TreeSampler::new(lights)),
         SamplerKind::TreeVisible => visitor.visit(TreeVisibleSampler::new(lights, settings)),
-        SamplerKind::Table => visitor.visit(TableSampler::new(lights, settings)),
+        SamplerKind::Table => visitor.visit(TableSampler::new(lights, scene.radius, settings)),
     }
 }

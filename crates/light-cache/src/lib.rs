@@ -9,6 +9,7 @@
 //! logs are merged in the order of the image's tiles.
 
 mod belief;
+mod brightness;
 mod dispatch;
 mod octree;
 mod power;

@@ -1,21 +1,24 @@
 //! The global running importance table (Wald, Benthin and Slusallek 2003, "Interactive Global Illumination in Complex and Highly Occluded Environments").
 //!
-//! Eye paths report what each light contributes to the pixels. Per light the table keeps the running maximum, decayed every
-//! frame, and the second moment, which is what the least noisy distribution is proportional to the root of (Rath et al.
-//! 2020, "Variance-Aware Path Guiding"): with the maximum alone errors are about a third higher once learned. A light
-//! is drawn in proportion to the root of the second moment, lifted by a share of the maximum so that a light that has just
-//! turned up is drawn at once. Differs from Wald et al.: no separate estimation pass, every frame teaches the next.
+//! Eye paths report what each light contributes to the pixels, in units of the brightness around the point (errors are
+//! judged by that). Per light the table keeps the running maximum, decayed every frame, and the second moment: the least
+//! noisy distribution is proportional to its root (Rath et al. 2020, "Variance-Aware Path Guiding"). A light is drawn
+//! in proportion to that root, lifted by a share of the maximum so that a light that has just turned up is not forgotten
+//! again at once. Lights without samples are believed to be worth their power. Differs from Wald et al.: no separate
+//! estimation pass, every frame teaches the next.
 
 use crate::belief::chance_visible;
+use crate::brightness::Brightness;
 use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, records};
 use sampling::Discrete;
 use scene::{Light, Scene};
 use std::time::Instant;
 
 /// Samples' worth of trust in the prior, the light's power: higher values follow power longer.
-const PRIOR_SAMPLES: f64 = 2.0;
-/// Share of the running maximum in a light's weight.
-const MAX_SHARE: f64 = 0.1;
+const PRIOR_SAMPLES: f64 = 4.0;
+/// Share of the running maximum in a light's weight. Higher values follow a light that has just turned up sooner, and let a
+/// few strong samples own the table: on a building of 2,000 lights 0.1 costs twice the error of 0.
+const MAX_SHARE: f64 = 0.01;
 /// Contributions above this many times the light's weight count as that many: one spike must not own the table.
 const SPIKE: f64 = 64.0;
 /// Samples of one light after which its older half is forgotten, so that the table follows changes.
@@ -30,6 +33,7 @@ pub struct TableSampler {
     /// Like the primary one until a later hit has been seen.
     secondary: Option<Table>,
     prior: Vec<f64>,
+    brightness: Brightness,
     settings: Settings,
     frame: u32,
     build_s: f64,
@@ -61,8 +65,8 @@ struct Table {
 }
 
 impl TableSampler {
-    /// The table over `lights`, which starts as their power.
-    pub fn new(lights: &[Light], settings: &Settings) -> Self {
+    /// The table over `lights`, which starts as their power. `radius` of the scene, metres.
+    pub fn new(lights: &[Light], radius: f32, settings: &Settings) -> Self {
         let start = Instant::now();
         let strongest = lights.iter().map(|light| light.power).fold(f32::MIN_POSITIVE, f32::max);
         let prior: Vec<f64> = lights
@@ -74,6 +78,7 @@ impl TableSampler {
             primary: Table::new(&prior, floor),
             secondary: None,
             prior,
+            brightness: Brightness::new(radius),
             settings: settings.clone(),
             frame: 0,
             build_s: start.elapsed().as_secs_f64(),
@@ -96,11 +101,15 @@ impl TableSampler {
             self.secondary = Some(Table::new(&self.prior, f64::from(self.settings.min_probability_mass)));
         }
         for observation in logs.iter().flatten() {
+            self.brightness.observe(observation);
+        }
+        for observation in logs.iter().flatten() {
+            let brightness = self.brightness.at(&observation.point);
             let table = match &mut self.secondary {
                 Some(secondary) if !observation.point.primary => secondary,
                 _ => &mut self.primary,
             };
-            table.observe(observation, self.frame, self.settings.table_decay);
+            table.observe(observation, brightness, self.frame, self.settings.table_decay);
         }
         for table in [Some(&mut self.primary), self.secondary.as_mut()].into_iter().flatten() {
             table.refresh(&self.prior, self.frame, &self.settings);
@@ -128,14 +137,14 @@ impl Table {
         }
     }
 
-    fn observe(&mut self, observation: &Observation, frame: u32, decay: f32) {
+    fn observe(&mut self, observation: &Observation, brightness: f32, frame: u32, decay: f32) {
         self.fresh += 1;
         let entry = &mut self.entries[observation.light as usize];
         entry.samples += 1.0;
         if !observation.visible {
             return;
         }
-        let contribution = observation.unshadowed.min(entry.spike);
+        let contribution = (observation.unshadowed / brightness.max(f32::MIN_POSITIVE)).min(entry.spike);
         entry.sum_sq += f64::from(contribution) * f64::from(contribution);
         entry.max = decayed(entry.max, decay, frame - entry.frame).max(contribution);
         entry.frame = frame;
@@ -252,7 +261,8 @@ impl LightSampler for TableSampler {
         SamplerStats {
             bytes: self.primary.bytes()
                 + self.secondary.as_ref().map_or(0, Table::bytes)
-                + size_of_val(&self.prior[..]),
+                + size_of_val(&self.prior[..])
+                + self.brightness.bytes(),
             min_probability: if ignoring { 0.0 } else { floor },
             build_s: self.build_s,
             learn_s: self.learn_s,
@@ -288,7 +298,7 @@ mod tests {
     use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, point, points, scene_of};
 
     fn taught(scene: &Scene, settings: &Settings, frames: u32, visible: impl Fn(u32) -> bool) -> TableSampler {
-        let mut sampler = TableSampler::new(&scene.lights, settings);
+        let mut sampler = TableSampler::new(&scene.lights, scene.radius, settings);
         for frame in 0..frames {
             let logs = observe(&sampler, scene, frame, &visible);
             sampler.end_frame(scene, &logs);
@@ -333,7 +343,7 @@ mod tests {
     #[test]
     fn first_and_later_hits_have_their_own_tables() {
         let scene = scene_of(mixed_lights(100, 3));
-        let mut sampler = TableSampler::new(&scene.lights, &Settings::default());
+        let mut sampler = TableSampler::new(&scene.lights, scene.radius, &Settings::default());
         let mut logs = observe(&sampler, &scene, 0, |_| true);
         for observation in logs.iter_mut().flatten() {
             observation.point.primary = true;
@@ -353,7 +363,7 @@ mod tests {
     fn the_maximum_is_remembered_and_shrinks() {
         let scene = scene_of(mixed_lights(50, 3));
         let settings = Settings::default();
-        let mut sampler = TableSampler::new(&scene.lights, &settings);
+        let mut sampler = TableSampler::new(&scene.lights, scene.radius, &settings);
         let mut observation = observe(&sampler, &scene, 0, |_| true)[0][0];
         observation.light = 9;
         observation.point.primary = true;
