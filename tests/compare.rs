@@ -180,7 +180,7 @@ fn z(x: f64, y: f64, squared_error: f64) -> f64 {
 }
 
 /// How `a` and `b` differ beyond chance, if they do.
-fn disagreement(a: &Estimate, b: &Estimate) -> Option<String> {
+pub fn disagreement(a: &Estimate, b: &Estimate) -> Option<String> {
     let squared_error = a.mean.standard_error().powi(2) + b.mean.standard_error().powi(2);
     let of_mean = z(a.mean.mean(), b.mean.mean(), squared_error);
     if of_mean.abs() >= 3.0 {

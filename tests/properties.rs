@@ -7,20 +7,33 @@ use sampling::Random;
 use sampling::statistics::{chi_square_p, pooled_chi_square};
 use scene::surface::NO_LIGHT;
 use scene::{Camera, Material, PrimitiveId, Ray, Scene, SceneParts};
-use tests::compare::{Case, Plan, assert_same, image, sampled};
+use tests::compare::{Case, Plan, assert_same, disagreement, image, sampled};
 use tests::scenes::{Builder, ground, meter, point, still_life, still_life_camera, still_life_with};
+
+fn still_life_plan(seed: u64) -> Plan {
+    Plan::new(sampled(SamplerKind::Tree), 24, 18)
+        .bounces(1)
+        .effort(32, 24)
+        .seed(seed)
+}
 
 /// Asserts that `scene` seen by `camera` looks like the still life.
 fn assert_looks_like_still_life(what: &str, scene: &Scene, camera: &Camera) {
-    let plan = |seed| {
-        Plan::new(sampled(SamplerKind::Tree), 24, 18)
-            .bounces(1)
-            .effort(32, 24)
-            .seed(seed)
-    };
     let (original, its_camera) = (still_life(1.0).build(), still_life_camera(1.0));
-    let original = Case::new(&original, &its_camera, plan(0)).measure();
-    assert_same(what, &Case::new(scene, camera, plan(1000)), &original);
+    let original = Case::new(&original, &its_camera, still_life_plan(0)).measure();
+    assert_same(what, &Case::new(scene, camera, still_life_plan(1000)), &original);
+}
+
+/// The comparison that the tests here rely on is sharp: one of several lamps a tenth dimmer does not pass.
+#[test]
+fn a_dimmer_lamp_is_noticed() {
+    let (original, camera) = (still_life(1.0).build(), still_life_camera(1.0));
+    let mut parts = still_life(1.0).parts();
+    parts.punctual[0].0.intensity *= 0.9;
+    let dimmer = Scene::new(parts).expect("the scene is valid");
+    let [a, b] = [(&original, 0), (&dimmer, 1000)]
+        .map(|(scene, seed)| Case::new(scene, &camera, still_life_plan(seed)).estimate());
+    assert!(disagreement(&a, &b).is_some(), "{:?} passes as {:?}", b.mean, a.mean);
 }
 
 #[test]
