@@ -1,1 +1,4 @@
-fn main() {}
+//! The program as the tests run it.
+fn main() -> std::process::ExitCode {
+    viewer::run()
+}

@@ -1,1 +1,5 @@
-fn main() {}
+//! The `manylight` program.
+
+fn main() -> std::process::ExitCode {
+    viewer::run()
+}

@@ -1,0 +1,253 @@
+//! The command line: commands, and the options that several of them share.
+
+use crate::exit::Refusal;
+use crate::{cmd, machine};
+use anyhow::Result;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use light_cache::SamplerKind;
+use render::{Method, PixelFilter};
+
+/// Renders scenes with very many lights, and learns which of them matter.
+#[derive(Debug, Parser)]
+#[command(
+    name = "manylight",
+    version = machine::VERSION,
+    arg_required_else_help = true,
+    subcommand_required = true,
+    after_help = "\
+Examples:
+  manylight render demo:rooms -o rooms.png            a building with 2,048 lights, nothing to download
+  manylight render hall.glb -o hall.exr --time 60     your own glTF, one minute
+  manylight info hall.glb                             what was loaded, what was ignored and why
+  manylight dump hall.glb -o - --top 10               the ten lights that matter most, as CSV
+  manylight bench demo:rooms --samplers power,table   how fast does the error fall?
+
+Exit codes: 0 done, 1 a comparison was above its threshold, 2 bad usage or input, 3 no suitable GPU,
+4 out of memory, 130 interrupted (what is there is written first)."
+)]
+pub(crate) struct Cli {
+    /// What to do.
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// No progress and no summary; warnings and errors only
+    #[arg(short, long, global = true)]
+    pub(crate) quiet: bool,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Render an image to a file
+    Render(Box<cmd::render::RenderArgs>),
+    /// Compare samplers: frame times, and how fast the error falls
+    Bench(cmd::bench::BenchArgs),
+    /// Write what was learned about each light as a table
+    Dump(cmd::dump::DumpArgs),
+    /// Measure how far one image is from another
+    Compare(cmd::compare::CompareArgs),
+    /// Tell what was loaded from a scene and what was ignored, or what this program and machine can do
+    Info(cmd::info::InfoArgs),
+}
+
+/// Options of everything that renders.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct LightArgs {
+    /// Bounces after the first surface: 0 = emission and direct light only
+    ///
+    /// Higher values add indirect light; lower values are faster.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
+    pub(crate) max_bounces: u32,
+    /// Seed of all random numbers: same seed, same image, on any number of threads
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// Threads that render; default: RAYON_NUM_THREADS, or all processors
+    #[arg(long, value_name = "N", alias = "nthreads", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// What renders: this release has the CPU only
+    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
+    pub(crate) backend: Backend,
+    /// Camera of the scene, by name or by index
+    #[arg(long, value_name = "NAME|INDEX")]
+    pub(crate) camera: Option<String>,
+    /// How samples are spread around a pixel's centre
+    #[arg(long, value_enum, default_value_t = Filter::Box)]
+    pub(crate) pixel_filter: Filter,
+    /// Probability shared equally by all lights, whatever was learned, 0 to 1
+    ///
+    /// Higher values find overlooked lights sooner; lower values waste fewer samples.
+    #[arg(long, value_name = "MASS", default_value_t = light_cache::Settings::default().min_probability_mass,
+          value_parser = share)]
+    pub(crate) min_probability_mass: f32,
+    /// BIASED: ignore lights whose learned importance is below this share of the mean; 0 = off
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
+    pub(crate) ignore_below: f32,
+}
+
+/// How much work to do; with both, whichever comes first.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct BudgetArgs {
+    /// Samples per pixel (frames)
+    #[arg(long, value_name = "N", alias = "samples", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) spp: Option<u64>,
+    /// Seconds of rendering; loading and building come on top and are reported
+    #[arg(long, value_name = "SECONDS", aliases = ["time-limit"], value_parser = seconds)]
+    pub(crate) time: Option<f64>,
+}
+
+/// The size of the image. With one of the two, the other follows from 16:9.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct SizeArgs {
+    /// Width in pixels
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=32_768))]
+    pub(crate) width: Option<u32>,
+    /// Height in pixels
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=32_768))]
+    pub(crate) height: Option<u32>,
+}
+
+impl SizeArgs {
+    /// Width and height, `default` where neither is given.
+    pub(crate) fn or(&self, default: (u32, u32)) -> (u32, u32) {
+        let scale = |size: u32, up: u32, down: u32| (size * up / down).clamp(1, 32_768);
+        match (self.width, self.height) {
+            (Some(width), Some(height)) => (width, height),
+            (Some(width), None) => (width, scale(width, default.1, default.0)),
+            (None, Some(height)) => (scale(height, default.0, default.1), height),
+            (None, None) => default,
+        }
+    }
+}
+
+impl LightArgs {
+    /// The settings of rendering that these options stand for.
+    ///
+    /// # Errors
+    /// If a GPU is asked for.
+    pub(crate) fn settings(&self, method: Method, (width, height): (u32, u32)) -> Result<render::Settings> {
+        if self.backend == Backend::Gpu {
+            let text = "this release renders on the CPU only: there is no GPU back end; leave --backend away";
+            return Err(Refusal::NoGpu(text.into()).into());
+        }
+        Ok(render::Settings {
+            width,
+            height,
+            method,
+            max_bounces: self.max_bounces,
+            seed: self.seed,
+            pixel_filter: self.pixel_filter.into(),
+            light: light_cache::Settings {
+                min_probability_mass: self.min_probability_mass,
+                ignore_below: self.ignore_below,
+                ..Default::default()
+            },
+            ..Default::default()
+        })
+    }
+}
+
+/// What renders.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Backend {
+    /// Processor.
+    Cpu,
+    /// Not in this release.
+    #[value(hide = true)]
+    Gpu,
+}
+
+/// [`PixelFilter`] on the command line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Filter {
+    /// the pixel's own area
+    Box,
+    /// standard deviation 0.5 pixels
+    Gaussian,
+    /// 4 terms, 3 pixels wide
+    BlackmanHarris,
+}
+
+impl From<Filter> for PixelFilter {
+    fn from(filter: Filter) -> Self {
+        match filter {
+            Filter::Box => Self::Box,
+            Filter::Gaussian => Self::Gaussian,
+            Filter::BlackmanHarris => Self::BlackmanHarris,
+        }
+    }
+}
+
+/// What a method does, in a few words.
+pub(crate) fn describe(method: Method) -> &'static str {
+    match method {
+        Method::Exact => "all lights at every point: the judge, slow",
+        Method::Sampled(kind) => match kind {
+            SamplerKind::Uniform => "every light alike",
+            SamplerKind::Power => "in proportion to emitted power",
+            SamplerKind::Octree => "contributions learned per cell of a fixed subdivision of space",
+            SamplerKind::Tree => "light tree with bounding cones, visibility unknown",
+            SamplerKind::TreeVisible => "light tree, leaf flux times learned visibility",
+            SamplerKind::Table => "global running-maximum importance table",
+        },
+    }
+}
+
+/// Accepts the names of all methods.
+pub(crate) fn any_method() -> impl TypedValueParser<Value = Method> {
+    methods(Method::all().collect())
+}
+
+/// Accepts the names of the methods that choose lights.
+pub(crate) fn sampled_method() -> impl TypedValueParser<Value = Method> {
+    methods(SamplerKind::ALL.map(Method::Sampled).to_vec())
+}
+
+fn methods(accepted: Vec<Method>) -> impl TypedValueParser<Value = Method> {
+    let values = accepted.iter().map(|&m| PossibleValue::new(m.name()).help(describe(m)));
+    PossibleValuesParser::new(values.collect::<Vec<_>>()).try_map(move |name| {
+        let found = accepted.iter().copied().find(|m| m.name() == name);
+        found.ok_or("no such sampler")
+    })
+}
+
+/// Reads a positive number of seconds.
+pub(crate) fn seconds(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('s').parse::<f64>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("must be a positive number of seconds, such as 10 or 0.5".into()),
+    }
+}
+
+fn share(text: &str) -> Result<f32, String> {
+    let value = text.parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value));
+    value.ok_or_else(|| "must be a number from 0 to 1".into())
+}
+
+fn not_negative(text: &str) -> Result<f32, String> {
+    let value = text
+        .parse::<f32>()
+        .ok()
+        .filter(|value| *value >= 0.0 && value.is_finite());
+    value.ok_or_else(|| "must be a number of at least 0".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cli, SizeArgs};
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn the_other_side_follows() {
+        let size = |width, height| SizeArgs { width, height }.or((1280, 720));
+        assert_eq!(size(None, None), (1280, 720));
+        assert_eq!(size(Some(640), None), (640, 360));
+        assert_eq!(size(None, Some(1080)), (1920, 1080));
+        assert_eq!(size(Some(1), None), (1, 1));
+        assert_eq!(size(None, Some(32_768)), (32_768, 32_768));
+    }
+}

@@ -1,0 +1,145 @@
+//! `bench`: how fast the error falls, by scene and sampler.
+
+mod plot;
+mod reference;
+mod report;
+mod run;
+mod summary;
+
+use crate::cli::{LightArgs, SizeArgs, any_method, seconds};
+use crate::exit::Status;
+use crate::interrupt::Watch;
+use crate::machine::Machine;
+use crate::{message, output, session};
+use anyhow::{Context, Result, bail};
+use clap::Args;
+use light_cache::SamplerKind;
+use reference::Reference;
+use render::Method;
+use run::Run;
+use std::path::PathBuf;
+use summary::SceneResult;
+
+/// Options of `bench`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  manylight bench                                              all generated scenes, all samplers (a coffee long)
+  manylight bench demo:rooms --samplers uniform,power,table --time 1,4
+  manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
+
+Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
+measuring is not counted as time, building the light structures and learning are. The runs of a scene take turns frame
+by frame, so that a busy machine slows all of them alike.
+Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
+pub(crate) struct BenchArgs {
+    /// .gltf or .glb files, or demo:NAME[:LIGHTS[:SEED]]; default: all generated scenes
+    scenes: Vec<String>,
+    /// Samplers to compare; default: all but exact
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = any_method())]
+    samplers: Vec<Method>,
+    /// Times at which errors are compared, in seconds; every run lasts as long as the last of them
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0.1,1,10", value_parser = seconds)]
+    time: Vec<f64>,
+    /// Runs per sampler, each with another seed; the table shows medians, summary.json also the spread
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    seeds: u32,
+    /// Samples per pixel of the reference
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(2..))]
+    reference_spp: u64,
+    /// Use this image (.exr) as the reference; with one scene only
+    #[arg(long, value_name = "FILE")]
+    reference: Option<PathBuf>,
+    /// Folder in which references are kept; default: the user's cache folder
+    #[arg(long, value_name = "DIR")]
+    reference_cache: Option<PathBuf>,
+    #[command(flatten)]
+    size: SizeArgs,
+    #[command(flatten)]
+    light: LightArgs,
+    /// Folder for the results
+    #[arg(short, long, value_name = "DIR", default_value = "bench-out")]
+    output: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input; files that cannot be written.
+pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
+    let methods: Vec<Method> = match args.samplers.as_slice() {
+        [] => SamplerKind::ALL.map(Method::Sampled).to_vec(),
+        some => Method::all().filter(|method| some.contains(method)).collect(),
+    };
+    let scenes: Vec<String> = match args.scenes.as_slice() {
+        [] => scene::generate::names().map(|name| format!("demo:{name}")).collect(),
+        some => some.to_vec(),
+    };
+    if args.reference.is_some() && scenes.len() != 1 {
+        bail!("--reference is for one scene, {} are given", scenes.len());
+    }
+    let mut times = args.time.clone();
+    times.sort_by(f64::total_cmp);
+    times.dedup();
+    let settings = args.light.settings(methods[0], args.size.or((256, 192)))?;
+    settings.check()?;
+    std::fs::create_dir_all(&args.output)
+        .with_context(|| format!("{}: cannot make the output folder", args.output.display()))?;
+    output::check_writable(&args.output.join("summary.json"))?;
+    let cache = args
+        .reference_cache
+        .clone()
+        .unwrap_or_else(|| reference::default_cache(&args.output));
+    session::use_threads(args.light.threads)?;
+
+    let mut results = Vec::new();
+    let mut interrupted = false;
+    for what in &scenes {
+        let loaded = session::load_with_warnings(what)?;
+        let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
+        let watch = Watch::rendering();
+        let reference = match &args.reference {
+            Some(path) => Some(Reference::read(path, &settings)?),
+            None => Reference::get(&loaded.scene, camera, &settings, args.reference_spp, &cache, &watch)?,
+        };
+        let Some(reference) = reference else {
+            interrupted = true;
+            break;
+        };
+        let mut runs = Vec::new();
+        for seed in 0..args.seeds {
+            let settings = render::Settings {
+                seed: settings.seed + u64::from(seed),
+                ..settings.clone()
+            };
+            let what = format!("{what}, run {} of {}", seed + 1, args.seeds);
+            runs.extend(Run::all(
+                &loaded.scene,
+                camera,
+                &settings,
+                &methods,
+                &times,
+                &reference,
+                &watch,
+                &what,
+            )?);
+        }
+        interrupted = watch.stopped();
+        let result = SceneResult::new(&loaded, &methods, &times, &reference, runs);
+        output::print(&report::table(&result))?;
+        results.push(result);
+        if interrupted {
+            break;
+        }
+    }
+    let machine = Machine::detect();
+    report::write_all(&args.output, &machine, &settings, &results)?;
+    for result in &results {
+        plot::write_all(&args.output, result)?;
+    }
+    message::note(format!(
+        "{}: frames.csv, summary.json, setup.md and plots written",
+        args.output.display()
+    ));
+    Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}

@@ -1,0 +1,148 @@
+//! Runs of samplers that take turns.
+
+use super::reference::Reference;
+use crate::interrupt::Watch;
+use crate::progress::Progress;
+use crate::session;
+use anyhow::Result;
+use render::{FrameLoop, ImageError, Method, Settings};
+use scene::{Camera, Scene};
+use std::time::Instant;
+
+/// One frame of a run.
+#[derive(Clone, Debug)]
+pub(super) struct Frame {
+    /// Milliseconds of this frame, learning included.
+    pub(super) frame_ms: f64,
+    /// Seconds since the start of the run: light build, frames, learning; measuring excluded.
+    pub(super) elapsed_s: f64,
+    /// The error after this frame, where it was measured.
+    pub(super) error: Option<ImageError>,
+}
+
+/// One rendering from scratch.
+#[derive(Clone, Debug)]
+pub(super) struct Run {
+    /// How lights were chosen.
+    pub(super) method: Method,
+    /// Seed.
+    pub(super) seed: u64,
+    /// Seconds of building the light structures.
+    pub(super) light_build_s: f64,
+    /// Seconds of learning, part of the frames.
+    pub(super) learn_s: f64,
+    /// All frames.
+    pub(super) frames: Vec<Frame>,
+}
+
+/// A run that is not finished.
+struct Active<'s> {
+    run: Run,
+    renderer: Box<dyn FrameLoop + 's>,
+    elapsed_s: f64,
+    /// The next of the times to be measured at.
+    next_time: usize,
+}
+
+impl Run {
+    /// Renders with every method until the last of `times`. The method that is furthest behind renders the next frame: so
+    /// all of them see the same machine, whatever else it does.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    #[expect(clippy::too_many_arguments, reason = "all of them differ in type, and are used once")]
+    pub(super) fn all(
+        scene: &Scene,
+        camera: &Camera,
+        settings: &Settings,
+        methods: &[Method],
+        times: &[f64],
+        reference: &Reference,
+        watch: &Watch,
+        what: &str,
+    ) -> Result<Vec<Self>> {
+        let last = *times.last().expect("the command line asks for at least one time");
+        let mut active = Vec::with_capacity(methods.len());
+        for &method in methods {
+            active.push(Active::start(scene, camera, settings, method)?);
+        }
+        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let mut progress = Progress::new(what);
+        while !watch.stopped() {
+            let behind = active.iter_mut().filter(|a| a.next_time < times.len());
+            let Some(next) = behind.min_by(|a, b| a.elapsed_s.total_cmp(&b.elapsed_s)) else {
+                break;
+            };
+            next.render_frame(times, reference);
+            let done: f64 = active.iter().map(|a| (a.elapsed_s / last).min(1.0)).sum();
+            let frames = active.iter().map(|a| a.run.frames.len() as u64).sum();
+            progress.update(done / active.len() as f64, frames, pixels);
+        }
+        Ok(active.into_iter().map(Active::finish).collect())
+    }
+
+    /// The measured state at `time`: the first at or after it, if the run came so far.
+    pub(super) fn at_time(&self, time: f64) -> Option<&Frame> {
+        self.frames
+            .iter()
+            .find(|frame| frame.elapsed_s >= time && frame.error.is_some())
+    }
+
+    /// The last state that was measured.
+    pub(super) fn last_measured(&self) -> Option<&Frame> {
+        self.frames.iter().rev().find(|frame| frame.error.is_some())
+    }
+}
+
+impl<'s> Active<'s> {
+    fn start(scene: &'s Scene, camera: &Camera, settings: &Settings, method: Method) -> Result<Self> {
+        let settings = Settings {
+            method,
+            ..settings.clone()
+        };
+        let renderer = session::start(scene, camera, &settings)?;
+        let light_build_s = renderer.stats().light_build_s;
+        Ok(Self {
+            run: Run {
+                method,
+                seed: settings.seed,
+                light_build_s,
+                learn_s: 0.0,
+                frames: Vec::new(),
+            },
+            renderer,
+            elapsed_s: light_build_s,
+            next_time: 0,
+        })
+    }
+
+    /// Renders a frame, then measures if the number of frames is a power of two or one of the times has come.
+    fn render_frame(&mut self, times: &[f64], reference: &Reference) {
+        let start = Instant::now();
+        self.renderer.render_frame();
+        let frame_s = start.elapsed().as_secs_f64();
+        self.elapsed_s += frame_s;
+        let count = self.run.frames.len() + 1;
+        let passed = times[self.next_time..]
+            .iter()
+            .take_while(|time| self.elapsed_s >= **time)
+            .count();
+        self.next_time += passed;
+        let due = passed > 0 || count.is_power_of_two();
+        let error = if due {
+            ImageError::between(&self.renderer.film().image(), &reference.image)
+        } else {
+            None
+        };
+        self.run.frames.push(Frame {
+            frame_ms: frame_s * 1e3,
+            elapsed_s: self.elapsed_s,
+            error,
+        });
+    }
+
+    fn finish(mut self) -> Run {
+        self.run.learn_s = self.renderer.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
+        self.run
+    }
+}

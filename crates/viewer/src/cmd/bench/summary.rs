@@ -1,0 +1,219 @@
+//! From runs to figures: medians over seeds, efficiencies.
+
+use super::reference::{Facts, Reference};
+use super::run::{Frame, Run};
+use crate::session::Loaded;
+use render::Method;
+use serde::Serialize;
+
+/// All that was measured on one scene.
+#[derive(Debug, Serialize)]
+pub(super) struct SceneResult {
+    /// What was asked for.
+    pub(super) what: String,
+    /// Name of the scene.
+    pub(super) name: String,
+    /// Number of lights.
+    pub(super) lights: usize,
+    /// Number of triangles.
+    pub(super) triangles: u64,
+    /// Seconds of loading.
+    pub(super) load_s: f64,
+    /// Seconds of building the BVH.
+    pub(super) build_s: f64,
+    /// What the errors are measured against.
+    pub(super) reference: Facts,
+    /// One entry per sampler.
+    pub(super) samplers: Vec<SamplerResult>,
+    /// Everything that was measured.
+    #[serde(skip)]
+    pub(super) runs: Vec<Run>,
+}
+
+/// What one sampler did on one scene.
+#[derive(Debug, Serialize)]
+pub(super) struct SamplerResult {
+    /// Its name.
+    pub(super) sampler: &'static str,
+    /// Number of runs.
+    pub(super) seeds: usize,
+    /// Frames of all runs.
+    pub(super) frames: usize,
+    /// Median frame time, milliseconds, learning included.
+    pub(super) frame_ms_median: f64,
+    /// 95 % of the frames were faster.
+    pub(super) frame_ms_p95: f64,
+    /// 99 % of the frames were faster.
+    pub(super) frame_ms_p99: f64,
+    /// The slowest frame.
+    pub(super) frame_ms_max: f64,
+    /// Seconds of building the light structures, median.
+    pub(super) light_build_s: f64,
+    /// Seconds of learning, median.
+    pub(super) learn_s: f64,
+    /// Errors at equal time.
+    pub(super) at_time: Vec<Point>,
+    /// Errors at equal numbers of frames.
+    pub(super) at_frames: Vec<Point>,
+    /// 1 / (relMSE x seconds) at the end, median over the runs.
+    pub(super) efficiency: Option<f64>,
+    /// The same with the trimmed relMSE.
+    pub(super) efficiency_trimmed: Option<f64>,
+    /// Efficiency over that of `uniform`.
+    pub(super) to_uniform: Option<f64>,
+    /// Efficiency over that of the best other sampler.
+    pub(super) to_best_other: Option<f64>,
+}
+
+/// The error at one moment: medians over the runs that came so far, and the spread over them.
+#[derive(Debug, Serialize)]
+pub(super) struct Point {
+    /// The time or number of frames asked for.
+    pub(super) at: f64,
+    /// When it was measured, seconds since the start, everything included.
+    pub(super) elapsed_s: f64,
+    /// relMSE.
+    pub(super) relmse: f64,
+    /// Least over the runs.
+    pub(super) relmse_min: f64,
+    /// Largest over the runs.
+    pub(super) relmse_max: f64,
+    /// relMSE without the worst 0.1 % of the pixels.
+    pub(super) relmse_trimmed: f64,
+}
+
+impl SceneResult {
+    /// Works out the figures; warns if the reference is too noisy for them.
+    pub(super) fn new(
+        loaded: &Loaded,
+        methods: &[Method],
+        times: &[f64],
+        reference: &Reference,
+        runs: Vec<Run>,
+    ) -> Self {
+        let of = |method: Method| runs.iter().filter(|run| run.method == method).collect::<Vec<_>>();
+        let mut samplers: Vec<_> = methods.iter().map(|&m| SamplerResult::new(m, &of(m), times)).collect();
+        let efficiencies: Vec<Option<f64>> = samplers.iter().map(|s| s.efficiency).collect();
+        let uniform = samplers
+            .iter()
+            .find(|s| s.sampler == "uniform")
+            .and_then(|s| s.efficiency);
+        for (index, sampler) in samplers.iter_mut().enumerate() {
+            let others = efficiencies.iter().enumerate().filter(|(i, _)| *i != index);
+            let best = others.filter_map(|(_, e)| *e).max_by(f64::total_cmp);
+            let over = |other: Option<f64>| Some(sampler.efficiency? / other?);
+            (sampler.to_uniform, sampler.to_best_other) = (over(uniform), over(best));
+        }
+        let last = runs.iter().filter_map(|run| run.last_measured()?.error);
+        if let Some(least) = last.map(|error| error.relmse).min_by(f64::total_cmp) {
+            reference.warn_if_noisy(&loaded.what, least);
+        }
+        Self {
+            what: loaded.what.clone(),
+            name: loaded.scene.parts.name.clone(),
+            lights: loaded.scene.lights.len(),
+            triangles: loaded.scene.triangle_count(),
+            load_s: loaded.load_s,
+            build_s: loaded.scene.build_s,
+            reference: reference.facts.clone(),
+            samplers,
+            runs,
+        }
+    }
+}
+
+impl SamplerResult {
+    fn new(method: Method, runs: &[&Run], times: &[f64]) -> Self {
+        let mut frame_ms: Vec<f64> = runs
+            .iter()
+            .flat_map(|run| &run.frames)
+            .map(|frame| frame.frame_ms)
+            .collect();
+        frame_ms.sort_by(f64::total_cmp);
+        let most = runs.iter().map(|run| run.frames.len()).max().unwrap_or(0);
+        let powers = (0..usize::BITS)
+            .map(|bit| 1usize << bit)
+            .take_while(|&count| count <= most);
+        let efficiency = |pick: fn(&Frame) -> Option<f64>| {
+            let all = runs.iter().filter_map(|run| {
+                let last = run.last_measured()?;
+                let value = 1.0 / (pick(last)? * last.elapsed_s);
+                value.is_finite().then_some(value)
+            });
+            median(all.collect())
+        };
+        Self {
+            sampler: method.name(),
+            seeds: runs.len(),
+            frames: frame_ms.len(),
+            frame_ms_median: quantile(&frame_ms, 0.5),
+            frame_ms_p95: quantile(&frame_ms, 0.95),
+            frame_ms_p99: quantile(&frame_ms, 0.99),
+            frame_ms_max: quantile(&frame_ms, 1.0),
+            light_build_s: median(runs.iter().map(|run| run.light_build_s).collect()).unwrap_or(0.0),
+            learn_s: median(runs.iter().map(|run| run.learn_s).collect()).unwrap_or(0.0),
+            at_time: times
+                .iter()
+                .filter_map(|&time| Point::new(time, runs, |run| run.at_time(time)))
+                .collect(),
+            at_frames: powers
+                .filter_map(|n| Point::new(n as f64, runs, |run| run.frames.get(n - 1)))
+                .collect(),
+            efficiency: efficiency(|frame| Some(frame.error?.relmse)),
+            efficiency_trimmed: efficiency(|frame| Some(frame.error?.relmse_trimmed)),
+            to_uniform: None,
+            to_best_other: None,
+        }
+    }
+}
+
+impl Point {
+    fn new<'r>(at: f64, runs: &[&'r Run], pick: impl Fn(&'r Run) -> Option<&'r Frame>) -> Option<Self> {
+        let frames: Vec<_> = runs
+            .iter()
+            .filter_map(|run| pick(run))
+            .filter_map(|f| Some((f, f.error?)))
+            .collect();
+        let mut relmse: Vec<f64> = frames.iter().map(|(_, error)| error.relmse).collect();
+        relmse.sort_by(f64::total_cmp);
+        Some(Self {
+            at,
+            elapsed_s: median(frames.iter().map(|(frame, _)| frame.elapsed_s).collect())?,
+            relmse: quantile(&relmse, 0.5),
+            relmse_min: quantile(&relmse, 0.0),
+            relmse_max: quantile(&relmse, 1.0),
+            relmse_trimmed: median(frames.iter().map(|(_, error)| error.relmse_trimmed).collect())?,
+        })
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    (!values.is_empty()).then(|| quantile(&values, 0.5))
+}
+
+/// The value below which a share `q` of the sorted `values` lies, interpolated; NaN if there are none.
+fn quantile(values: &[f64], q: f64) -> f64 {
+    let Some(last) = values.len().checked_sub(1) else {
+        return f64::NAN;
+    };
+    let place = q * last as f64;
+    let (below, rest) = (place.floor() as usize, place.fract());
+    let above = values[(below + 1).min(last)];
+    values[below] + (above - values[below]) * rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{median, quantile};
+
+    #[test]
+    fn quantiles_interpolate() {
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.5), 2.0);
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 0.75), 3.0);
+        assert_eq!(quantile(&[1.0, 2.0, 4.0], 1.0), 4.0);
+        assert!(quantile(&[], 0.5).is_nan());
+        assert_eq!(median(vec![3.0, 1.0]), Some(2.0));
+        assert_eq!(median(Vec::new()), None);
+    }
+}

@@ -1,0 +1,7 @@
+//! One module per command: its options, and what it does.
+
+pub(crate) mod bench;
+pub(crate) mod compare;
+pub(crate) mod dump;
+pub(crate) mod info;
+pub(crate) mod render;

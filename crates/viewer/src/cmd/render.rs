@@ -1,0 +1,253 @@
+//! `render`: an image to a file.
+
+mod stats;
+
+use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method};
+use crate::exit::Status;
+use crate::interrupt::Watch;
+use crate::output::is_stdout;
+use crate::session::{self, Budget, Loaded};
+use crate::tev::Display;
+use crate::{machine, message, output, table};
+use anyhow::{Result, bail};
+use clap::{Args, ValueEnum};
+use render::image::{self, Channel};
+use render::{Film, Method, RenderStats, Settings};
+use stats::Stats;
+use std::path::{Path, PathBuf};
+
+/// Options of `render`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  manylight render demo:rooms -o rooms.png
+  manylight render demo:plaza:100000 -o plaza.exr --time 30 --stats plaza.json
+  manylight render hall.glb -o hall.exr --spp 256 --max-bounces 4 --camera 1 --aov albedo,normal,variance
+  manylight render hall.glb -o hall.exr --display-server localhost:14158    (watch it in tev)
+
+EXR files are linear, float32, in the scene's own units, with all settings in their metadata; PNG files are tone-mapped.
+Ctrl-C writes what is there and exits with 130.")]
+pub(crate) struct RenderArgs {
+    /// A .gltf or .glb file, or demo:NAME[:LIGHTS[:SEED]] (`manylight info` lists them)
+    scene: String,
+    /// The image: .exr or .png
+    #[arg(short, long, value_name = "FILE", alias = "outfile")]
+    output: PathBuf,
+    #[command(flatten)]
+    budget: BudgetArgs,
+    #[command(flatten)]
+    size: SizeArgs,
+    /// How lights are chosen
+    #[arg(long, value_name = "NAME", default_value = "tree-visible", value_parser = any_method())]
+    sampler: Method,
+    #[command(flatten)]
+    light: LightArgs,
+    /// Exposure of a PNG in stops; default: by the image's brightness
+    #[arg(long, value_name = "STOPS", allow_negative_numbers = true)]
+    exposure: Option<f32>,
+    /// Further layers of an EXR
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_enum)]
+    aov: Vec<Aov>,
+    /// Write all figures of the run as JSON ("-" for stdout)
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
+    /// Show the image while it is made in tev, which listens at localhost:14158
+    #[arg(long, value_name = "HOST:PORT")]
+    display_server: Option<String>,
+}
+
+/// Layers besides the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Aov {
+    /// diffuse albedo plus specular reflectance (albedo.R .G .B)
+    Albedo,
+    /// shading normal, world space (normal.X .Y .Z)
+    Normal,
+    /// distance from the camera in metres (depth.Z)
+    Depth,
+    /// world position in metres (position.X .Y .Z)
+    Position,
+    /// index of the light chosen by the last sample, -1 for none (light.V)
+    Light,
+    /// variance of the pixel's mean luminance (variance.V)
+    Variance,
+}
+
+/// The file formats of images.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Format {
+    Exr,
+    Png,
+}
+
+impl Format {
+    fn of(path: &Path) -> Result<Self> {
+        match path
+            .extension()
+            .and_then(|e| e.to_str())
+            .map(str::to_ascii_lowercase)
+            .as_deref()
+        {
+            Some("exr") => Ok(Self::Exr),
+            Some("png") => Ok(Self::Png),
+            _ => bail!(
+                "{}: unknown image format; give a file name that ends in .exr or .png",
+                path.display()
+            ),
+        }
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input; files that cannot be written.
+pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
+    const DEFAULT_SPP: u64 = 64;
+    let format = Format::of(&args.output)?;
+    if format == Format::Png && !args.aov.is_empty() {
+        bail!("a PNG has no layers for --aov; write an .exr");
+    }
+    if args.exposure.is_some_and(|stops| !stops.is_finite()) {
+        bail!("--exposure must be a finite number of stops");
+    }
+    if format == Format::Exr && args.exposure.is_some() {
+        message::warn("--exposure is for PNG only: an EXR holds the radiance as it is");
+    }
+    output::check_writable(&args.output)?;
+    if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
+        output::check_writable(path)?;
+    }
+    let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)))?;
+    settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
+    settings.check()?;
+    if settings.light.ignore_below > 0.0 {
+        message::warn("--ignore-below drops lights: the image is biased, and marked so in its metadata and statistics");
+    }
+
+    session::use_threads(args.light.threads)?;
+    let loaded = session::load_with_warnings(&args.scene)?;
+    let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
+    let watch = Watch::rendering();
+    let mut frames = session::start(&loaded.scene, camera, &settings)?;
+    let title = format!("manylight {}", loaded.scene.parts.name);
+    let mut display = args
+        .display_server
+        .as_ref()
+        .map(|address| Display::connect(address, &title, settings.width, settings.height));
+    let budget = Budget::new(&args.budget, DEFAULT_SPP);
+    session::render_frames(frames.as_mut(), budget, &watch, "rendering", |state| {
+        if let Some(display) = &mut display {
+            display.update(|| state.film().image());
+        }
+    });
+
+    let interrupted = watch.writing();
+    let image = frames.film().image();
+    if let Some(display) = &mut display {
+        display.finish(&image);
+    }
+    let run = frames.stats();
+    let stats = Stats::new(&loaded, &camera.name, &settings, &run, interrupted);
+    match format {
+        Format::Png => {
+            let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
+            image::write_png(&args.output, &image, exposure)?;
+        }
+        Format::Exr => {
+            let mut channels = Channel::rgb("", &image).to_vec();
+            layers(&args.aov, frames.film(), &mut channels);
+            let metadata = metadata(&stats, &settings)?;
+            image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
+        }
+    }
+    if let Some(path) = &args.stats {
+        let json = serde_json::to_string_pretty(&stats)? + "\n";
+        if is_stdout(path) {
+            output::print(&json)?
+        } else {
+            output::write(path, json.as_bytes())?
+        }
+    }
+    summary(args, &loaded, &settings, &run);
+    if run.nonfinite_samples > 0 {
+        message::warn(format!(
+            "{} samples were not finite and were left out: this is a bug",
+            run.nonfinite_samples
+        ));
+    }
+    Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}
+
+/// The layers asked for, as channels.
+fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
+    let one = |name: &str, values: Vec<f32>| Channel {
+        name: name.into(),
+        values,
+    };
+    let vector = |layer: &str, image: &render::Image| {
+        [("X", 0), ("Y", 1), ("Z", 2)].map(|(axis, c)| Channel {
+            name: format!("{layer}.{axis}"),
+            values: image.pixels.iter().map(|pixel| pixel[c]).collect(),
+        })
+    };
+    if wanted.contains(&Aov::Variance) {
+        channels.push(one("variance.V", film.variance()));
+    }
+    let Some(aovs) = film.aovs() else { return };
+    if wanted.contains(&Aov::Albedo) {
+        channels.extend(Channel::rgb("albedo", &aovs.albedo));
+    }
+    if wanted.contains(&Aov::Normal) {
+        channels.extend(vector("normal", &aovs.normal));
+    }
+    if wanted.contains(&Aov::Position) {
+        channels.extend(vector("position", &aovs.position));
+    }
+    if wanted.contains(&Aov::Depth) {
+        channels.push(one("depth.Z", aovs.depth));
+    }
+    if wanted.contains(&Aov::Light) {
+        channels.push(one("light.V", aovs.light));
+    }
+}
+
+/// What an EXR tells about itself: one attribute per figure, and all settings as JSON.
+fn metadata(stats: &Stats, settings: &Settings) -> Result<Vec<(String, String)>> {
+    let entry = |name: &str, value: String| (format!("manylight.{name}"), value);
+    Ok(vec![
+        entry("version", machine::VERSION.into()),
+        entry("scene", stats.scene.clone()),
+        entry("camera", stats.camera.clone()),
+        entry("sampler", stats.sampler.into()),
+        entry("spp", stats.spp.to_string()),
+        entry("seed", stats.seed.to_string()),
+        entry("render_s", stats.render_s.to_string()),
+        entry("biased", stats.biased.clone().unwrap_or_else(|| "no".into())),
+        entry("settings", serde_json::to_string(settings)?),
+    ])
+}
+
+/// What was done, for people.
+fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &RenderStats) {
+    let samples = u64::from(settings.width) * u64::from(settings.height) * run.frames;
+    message::note(format!(
+        "{}: {} x {}, {} spp in {:.2} s, {:.2} Msamples/s, sampler {}, {} lights, {} triangles \
+         (load {:.2} s, BVH {:.2} s, lights {:.2} s)",
+        args.output.display(),
+        settings.width,
+        settings.height,
+        run.frames,
+        run.render_s,
+        samples as f64 / run.render_s.max(1e-9) * 1e-6,
+        settings.method.name(),
+        table::thousands(loaded.scene.lights.len() as u64),
+        table::thousands(loaded.scene.triangle_count()),
+        loaded.load_s,
+        loaded.scene.build_s,
+        run.light_build_s,
+    ));
+    for skipped in stats::skipped(&loaded.scene, run) {
+        message::note(format!("skipped: {skipped}"));
+    }
+}

@@ -1,0 +1,111 @@
+//! The figures of a rendering, for `--stats`.
+
+use crate::machine;
+use crate::session::Loaded;
+use render::{RenderStats, Settings};
+use scene::{Report, Scene};
+use serde::Serialize;
+
+/// All figures of a run. Field names are what scripts rely on.
+#[derive(Debug, Serialize)]
+pub(super) struct Stats {
+    /// Path or `demo:...`.
+    pub(super) scene: String,
+    /// Name of the camera.
+    pub(super) camera: String,
+    version: &'static str,
+    backend: &'static str,
+    /// Name of the sampler.
+    pub(super) sampler: &'static str,
+    width: u32,
+    height: u32,
+    max_bounces: u32,
+    /// Samples per pixel.
+    pub(super) spp: u64,
+    /// Seed of all random numbers.
+    pub(super) seed: u64,
+    threads: usize,
+    interrupted: bool,
+    load_s: f64,
+    build_s: f64,
+    light_build_s: f64,
+    /// Seconds of rendering, learning included.
+    pub(super) render_s: f64,
+    learn_s: f64,
+    lights: usize,
+    triangles: u64,
+    rays_nearest: u64,
+    rays_occluded: u64,
+    nonfinite_samples: u64,
+    cells: usize,
+    min_probability: f64,
+    light_bytes: usize,
+    bvh_bytes: usize,
+    peak_rss_bytes: u64,
+    skipped: Vec<String>,
+    /// What makes the image biased, if anything does.
+    pub(super) biased: Option<String>,
+    settings: Settings,
+    report: Report,
+}
+
+impl Stats {
+    /// Collects them.
+    pub(super) fn new(
+        loaded: &Loaded,
+        camera: &str,
+        settings: &Settings,
+        run: &RenderStats,
+        interrupted: bool,
+    ) -> Self {
+        let sampler = run.sampler.clone().unwrap_or_default();
+        // The flag follows the setting, also where the sampler at hand has no use for it and says nothing.
+        let asked = settings.light.ignore_below > 0.0;
+        let by_setting = || asked.then(|| format!("ignore_below = {}", settings.light.ignore_below));
+        Self {
+            scene: loaded.what.clone(),
+            camera: camera.into(),
+            version: machine::VERSION,
+            backend: "cpu",
+            sampler: settings.method.name(),
+            width: settings.width,
+            height: settings.height,
+            max_bounces: settings.max_bounces,
+            spp: run.frames,
+            seed: settings.seed,
+            threads: rayon::current_num_threads(),
+            interrupted,
+            load_s: loaded.load_s,
+            build_s: loaded.scene.build_s,
+            light_build_s: run.light_build_s,
+            render_s: run.render_s,
+            learn_s: sampler.learn_s,
+            lights: loaded.scene.lights.len(),
+            triangles: loaded.scene.triangle_count(),
+            rays_nearest: run.rays_nearest,
+            rays_occluded: run.rays_occluded,
+            nonfinite_samples: run.nonfinite_samples,
+            cells: sampler.cells,
+            min_probability: sampler.min_probability,
+            light_bytes: sampler.bytes,
+            bvh_bytes: loaded.scene.bvh().bytes(),
+            peak_rss_bytes: machine::peak_rss_bytes(),
+            skipped: skipped(&loaded.scene, run),
+            biased: sampler.biased.or_else(by_setting),
+            settings: settings.clone(),
+            report: loaded.scene.parts.report.clone(),
+        }
+    }
+}
+
+/// Everything that was left out because it was not needed.
+pub(super) fn skipped(scene: &Scene, run: &RenderStats) -> Vec<String> {
+    let mut all = scene.parts.report.skipped.clone();
+    let sampler = run.sampler.iter().flat_map(|sampler| &sampler.skipped);
+    for text in run.skipped.iter().chain(sampler) {
+        if !all.contains(text) {
+            all.push(text.clone());
+        }
+    }
+    all
+}

@@ -1,0 +1,66 @@
+//! Progress on stderr: a bar on a terminal, a line each 10 % elsewhere, nothing when quiet.
+
+use crate::{message, table};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::time::Instant;
+
+/// The progress of one job.
+pub(crate) struct Progress {
+    what: String,
+    bar: Option<ProgressBar>,
+    tenths: u64,
+    start: Instant,
+}
+
+/// Steps of the bar.
+const STEPS: u64 = 1000;
+
+impl Progress {
+    /// Starts to tell about `what`.
+    pub(crate) fn new(what: &str) -> Self {
+        let bar = (!message::quiet() && std::io::stderr().is_terminal()).then(|| {
+            let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {msg}  {elapsed} left {eta}");
+            bar.set_style(
+                style
+                    .unwrap_or_else(|_| ProgressStyle::default_bar())
+                    .progress_chars("=> "),
+            );
+            bar.set_prefix(what.to_string());
+            bar
+        });
+        Self {
+            what: what.into(),
+            bar,
+            tenths: 0,
+            start: Instant::now(),
+        }
+    }
+
+    /// `done` of the job (0 to 1) is done, after `frames` frames of `pixels` pixels each.
+    pub(crate) fn update(&mut self, done: f64, frames: u64, pixels: u64) {
+        let seconds = self.start.elapsed().as_secs_f64().max(1e-9);
+        let speed = (frames * pixels) as f64 / seconds * 1e-6;
+        if let Some(bar) = &self.bar {
+            bar.set_position((done * STEPS as f64) as u64);
+            bar.set_message(format!("{frames} spp  {speed:.2} Msamples/s"));
+        } else if (done * 10.0) as u64 > self.tenths {
+            self.tenths = (done * 10.0) as u64;
+            let seconds = table::number(seconds);
+            message::note(format!(
+                "{}: {} %, {frames} spp, {seconds} s, {speed:.2} Msamples/s",
+                self.what,
+                self.tenths * 10
+            ));
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

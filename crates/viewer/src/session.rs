@@ -1,0 +1,183 @@
+//! From arguments to frames: loading, choosing the camera, rendering until the budget is spent.
+
+use crate::cli::BudgetArgs;
+use crate::exit::Refusal;
+use crate::interrupt::Watch;
+use crate::progress::Progress;
+use crate::{machine, message};
+use anyhow::{Context, Result, bail};
+use render::{FrameLoop, Settings};
+use scene::{Camera, Scene};
+use std::path::Path;
+use std::time::Instant;
+
+/// A scene with how it came to be.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    /// The scene.
+    pub(crate) scene: Scene,
+    /// What was asked for: path or `demo:...`.
+    pub(crate) what: String,
+    /// Seconds of reading or generating, the BVH excluded.
+    pub(crate) load_s: f64,
+}
+
+/// Whether `word` looks like a scene rather than a mistyped command.
+pub(crate) fn looks_like_scene(word: &str) -> bool {
+    let extension = Path::new(word).extension().and_then(|e| e.to_str()).unwrap_or_default();
+    word.starts_with("demo:") || ["glb", "gltf"].contains(&extension) || Path::new(word).exists()
+}
+
+/// Sets up the threads for the whole process; call it before anything runs in parallel.
+///
+/// # Errors
+/// If the system gives no threads.
+pub(crate) fn use_threads(threads: Option<u16>) -> Result<()> {
+    // 0 lets rayon decide: RAYON_NUM_THREADS, else all processors.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0).into());
+    pool.build_global()
+        .context("cannot start the threads; try a smaller --threads")
+}
+
+/// Loads a scene and warns of what was ignored in it.
+///
+/// # Errors
+/// Those of [`scene::load`].
+pub(crate) fn load(what: &str) -> Result<Loaded> {
+    let start = Instant::now();
+    let scene = scene::load(what)?;
+    let load_s = (start.elapsed().as_secs_f64() - scene.build_s).max(0.0);
+    Ok(Loaded {
+        scene,
+        what: what.into(),
+        load_s,
+    })
+}
+
+/// [`load`], and tells on stderr what was ignored and repaired.
+///
+/// # Errors
+/// Those of [`scene::load`].
+pub(crate) fn load_with_warnings(what: &str) -> Result<Loaded> {
+    const SHOWN: usize = 5;
+    let loaded = load(what)?;
+    let report = &loaded.scene.parts.report;
+    let ignored = report
+        .ignored
+        .iter()
+        .map(|(what, count)| format!("ignored: {what} ({count}x)"));
+    let all: Vec<String> = ignored.chain(report.warnings.iter().cloned()).collect();
+    for text in all.iter().take(SHOWN) {
+        message::warn(text);
+    }
+    if all.len() > SHOWN {
+        message::warn(format!(
+            "{} more; `manylight info {what}` lists them",
+            all.len() - SHOWN
+        ));
+    }
+    if loaded.scene.lights.is_empty() {
+        message::warn("the scene has no lights: the image will be black");
+    }
+    Ok(loaded)
+}
+
+/// The camera of that name or index; the first if none is asked for.
+///
+/// # Errors
+/// If there is no such camera; tells which there are.
+pub(crate) fn camera<'s>(scene: &'s Scene, wanted: Option<&str>) -> Result<&'s Camera> {
+    let cameras = &scene.parts.cameras;
+    let found = match wanted {
+        None => cameras.first(),
+        Some(wanted) => {
+            let by_index = || wanted.parse().ok().and_then(|index: usize| cameras.get(index));
+            cameras.iter().find(|camera| camera.name == wanted).or_else(by_index)
+        }
+    };
+    let Some(camera) = found else {
+        let known: Vec<String> = cameras
+            .iter()
+            .enumerate()
+            .map(|(i, c)| format!("{i} '{}'", c.name))
+            .collect();
+        bail!(
+            "no camera '{}' in the scene; there is: {}",
+            wanted.unwrap_or_default(),
+            known.join(", ")
+        );
+    };
+    Ok(camera)
+}
+
+/// Starts a rendering, provided that its film fits into memory.
+///
+/// # Errors
+/// Settings out of range; [`Refusal::OutOfMemory`].
+pub(crate) fn start<'s>(scene: &'s Scene, camera: &Camera, settings: &Settings) -> Result<Box<dyn FrameLoop + 's>> {
+    // Compensated sums, moments, finished image and what the file writer copies; auxiliary images about double it.
+    let bytes_per_pixel = if settings.aovs { 256 } else { 128 };
+    let bytes = u64::from(settings.width) * u64::from(settings.height) * bytes_per_pixel;
+    if machine::available_memory_bytes().is_some_and(|available| bytes > available) {
+        let (gib, size) = (bytes as f64 / (1u64 << 30) as f64, (settings.width, settings.height));
+        let text = format!(
+            "an image of {} x {} pixels needs about {gib:.1} GiB, more than is free; ask for a smaller one",
+            size.0, size.1
+        );
+        return Err(Refusal::OutOfMemory(text).into());
+    }
+    Ok(render::renderer(scene, camera, settings)?)
+}
+
+/// When to stop.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Budget {
+    /// After so many frames.
+    pub(crate) frames: Option<u64>,
+    /// After so many seconds of rendering.
+    pub(crate) seconds: Option<f64>,
+}
+
+impl Budget {
+    /// What the options say; `default` frames if they say nothing.
+    pub(crate) fn new(args: &BudgetArgs, default: u64) -> Self {
+        let frames = args.spp.or(if args.time.is_none() { Some(default) } else { None });
+        Self {
+            frames,
+            seconds: args.time,
+        }
+    }
+
+    /// The part that is done, 1 at the end.
+    pub(crate) fn done(&self, frames: u64, seconds: f64) -> f64 {
+        let by_frames = self.frames.map_or(0.0, |all| frames as f64 / all as f64);
+        let by_time = self.seconds.map_or(0.0, |all| seconds / all);
+        by_frames.max(by_time).min(1.0)
+    }
+}
+
+/// Renders until the budget is spent or a signal comes; at least one frame. `each` sees the state after every frame,
+/// its time does not count. Returns the seconds spent in frames.
+pub(crate) fn render_frames(
+    frame_loop: &mut dyn FrameLoop,
+    budget: Budget,
+    watch: &Watch,
+    what: &str,
+    mut each: impl FnMut(&dyn FrameLoop),
+) -> f64 {
+    let pixels = u64::from(frame_loop.film().width()) * u64::from(frame_loop.film().height());
+    let mut progress = Progress::new(what);
+    let (mut frames, mut seconds) = (0, 0.0);
+    loop {
+        let start = Instant::now();
+        frame_loop.render_frame();
+        seconds += start.elapsed().as_secs_f64();
+        frames += 1;
+        let done = budget.done(frames, seconds);
+        progress.update(done, frames, pixels);
+        each(frame_loop);
+        if done >= 1.0 || watch.stopped() {
+            return seconds;
+        }
+    }
+}
