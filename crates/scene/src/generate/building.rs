@@ -161,8 +161,8 @@ impl Plan {
             }
             b.begin(format!("storey {storey} / walls"), "walls");
             self.walls(b, shell, storey);
+            b.place_in_world();
         }
-        b.place_in_world();
     }
 
     fn walls(&self, b: &mut Builder, shell: &Shell, storey: usize) {

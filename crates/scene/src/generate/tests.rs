@@ -162,6 +162,21 @@ fn cameras_stand_in_free_space_and_see_something() {
 }
 
 #[test]
+fn every_storey_lies_between_its_slabs() {
+    let parts = make("rooms");
+    let mesh = &parts.meshes[0];
+    let bounds = |slabs: bool| {
+        let chosen = (0..mesh.len()).filter(|&i| !slabs || parts.origins[mesh.origins[i] as usize].1 == "slab");
+        chosen
+            .flat_map(|i| mesh.corners(i))
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
+                (low.min(p), high.max(p))
+            })
+    };
+    assert_eq!(bounds(true), bounds(false));
+}
+
+#[test]
 fn a_building_of_a_million_lights_stays_small() {
     for what in ["rooms:1000000", "sun-outside:1000000"] {
         let parts = make(what);
