@@ -150,19 +150,18 @@ impl Connection {
     pub(crate) fn new(scene: &Scene, vertex: &Vertex<'_>, light: u32, pmf: f32, u: Vec2) -> Option<Self> {
         let surface = vertex.surface;
         let point = scene.sample_light(light, surface.position_ws, u)?;
-        // Both normals must see the light: the shading normal by `eval`, the geometric one here. Otherwise light leaks
+        // Both normals must see the light: the shading normal by `eval_pdf`, the geometric one here. Otherwise light leaks
         // through surfaces, or the two strategies would disagree.
         if surface.geometric_normal_ws.dot(point.wi_ws) <= 0.0 {
             return None;
         }
-        let value = surface.bsdf.eval(vertex.wo_ws, point.wi_ws);
+        let (value, pdf_bsdf) = surface.bsdf.eval_pdf(vertex.wo_ws, point.wi_ws);
         let unweighted = vertex.throughput * value * point.radiance / point.pdf_solid_angle;
         if unweighted == Vec3::ZERO {
             return None;
         }
         let record = &scene.lights[light as usize];
         let (weight, weight_if_certain) = if vertex.competes && !record.is_delta() {
-            let pdf_bsdf = surface.bsdf.pdf(vertex.wo_ws, point.wi_ws);
             (
                 mis::power(pmf * point.pdf_solid_angle, pdf_bsdf),
                 mis::power(point.pdf_solid_angle, pdf_bsdf),
