@@ -109,8 +109,8 @@ mod tests {
             (0..1000).map(|_| point(at(3), 1.0)).collect(),
             (0..1000).map(|i| point(at(i), 1.0)).collect(),
             // Each ten times as far: splits cut off one light at a time.
-            (0..36)
-                .map(|i| triangle(Vec3::X * 10.0_f32.powi(i - 18), Vec3::NEG_X, 1e-3, 1.0))
+            (0..26)
+                .map(|i| triangle(Vec3::X * 10.0_f32.powi(i - 13), Vec3::NEG_X, 1e-3, 1.0))
                 .collect::<Vec<_>>(),
         ] {
             let scene = scene_of(lights);
