@@ -34,7 +34,7 @@ pub struct Surface {
 
 impl Scene {
     /// Everything shading needs to know about a hit.
-    #[inline]
+    #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
         let placement = &self.shading.placements[hit.id.instance as usize];
         let triangle = &self.shading.triangles[(placement.first_triangle + hit.id.triangle) as usize];
@@ -55,7 +55,7 @@ impl Scene {
             emitter => self.shading.lights[(placement.first_emitter + emitter) as usize],
         };
         let emits = front || material.double_sided;
-        let mut surface = Surface {
+        let surface = Surface {
             position_ws,
             geometric_normal_ws,
             id: hit.id,
@@ -71,10 +71,11 @@ impl Scene {
                 alpha: material.alpha,
             },
         };
-        if !triangle.plain() {
-            self.refine(&mut surface, triangle, ray, hit);
+        if triangle.plain() {
+            surface
+        } else {
+            self.refine(surface, triangle, ray, hit)
         }
-        surface
     }
 
     /// World position and front normal of a hit on an instance that is not where its mesh is.
@@ -91,7 +92,7 @@ impl Scene {
     /// Interpolated normals, textures and vertex colours.
     #[cold]
     #[inline(never)]
-    fn refine(&self, surface: &mut Surface, triangle: &TriangleRecord, ray: &Ray, hit: &Hit) {
+    fn refine(&self, mut surface: Surface, triangle: &TriangleRecord, ray: &Ray, hit: &Hit) -> Surface {
         let instance = &self.parts.instances[hit.id.instance as usize];
         let mesh = &self.parts.meshes[instance.mesh as usize];
         let material = &self.parts.materials[triangle.material() as usize];
@@ -125,6 +126,7 @@ impl Scene {
             instance.world_normal_from_local * normal
         };
         surface.bsdf.normal_ws = usable_normal(normal_ws, surface.geometric_normal_ws, -ray.direction_ws);
+        surface
     }
 
     /// A ray that leaves `surface` towards `wi_ws`, its origin moved off the surface on the side of `wi_ws`.

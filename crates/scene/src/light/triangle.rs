@@ -10,10 +10,9 @@ use std::f32::consts::PI;
 /// digits left. [`Light::pdf_solid_angle`] is 0 there too.
 const LEAST_COSINE: f32 = 1e-5;
 
-/// A triangle is drawn by solid angle where the square of its extent (of both edges together) is more than this share of
-/// the square of its distance. Higher values draw more lights by area, which costs 15 ns instead of 100 but is noisier near
-/// lights; lower values draw more by solid angle. Over random places and normals at this distance the relative variance
-/// of the irradiance is about 0.08 by area and 0.02 by solid angle; at twice the value 0.17 and 0.04.
+/// A triangle is drawn by solid angle where the square of its extent (of both edges together) is more than this share of the square of its
+/// distance. Higher values draw more lights by area, which is faster, and noisier near lights; lower values draw more by solid angle.
+/// Measured on `one-light` (64 samples per pixel): 0.1 takes 25 % more time than 1 and has 13 % less squared error.
 const EXTENT_SQ_PER_DISTANCE_SQ: f32 = 0.5;
 
 impl Light {
