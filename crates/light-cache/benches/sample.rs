@@ -93,7 +93,7 @@ impl Visitor for Timing<'_> {
             sampling = sampling.min(start.elapsed().as_secs_f64());
             let start = Instant::now();
             for (point, &u) in points.iter().zip(&numbers) {
-                let light = (u64::from(u) * scene.lights.len() as u64 >> 32) as u32;
+                let light = ((u64::from(u) * scene.lights.len() as u64) >> 32) as u32;
                 black_box(sampler.pmf(&sampler.local(scene, point), light));
             }
             querying = querying.min(start.elapsed().as_secs_f64());

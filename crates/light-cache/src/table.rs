@@ -312,7 +312,7 @@ mod tests {
         for count in [1, 2, 300] {
             let scene = scene_of(mixed_lights(count, 3));
             for frames in [0, 4] {
-                let sampler = taught(&scene, &Settings::default(), frames, |light| light % 3 == 0);
+                let sampler = taught(&scene, &Settings::default(), frames, |light| light.is_multiple_of(3));
                 check(&sampler, &scene, &points(4, 5));
                 check_each_light_is_drawn(&sampler, &scene);
             }
@@ -383,7 +383,7 @@ mod tests {
     fn ignoring_is_off_until_asked_for_and_says_so() {
         let lights = (0..100).map(|i| point(glam::Vec3::splat(0.1 * i as f32), 1.0));
         let scene = scene_of(lights.collect());
-        let visible = |light: u32| light % 2 == 0;
+        let visible = |light: u32| light.is_multiple_of(2);
         let plain = taught(&scene, &Settings::default(), 8, visible);
         assert!(plain.stats().biased.is_none());
         let settings = Settings {

@@ -162,7 +162,7 @@ mod tests {
             let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
             check(&sampler, &scene, &points(16, 5));
             for frame in 0..4 {
-                let logs = observe(&sampler, &scene, frame, |light| light % 3 == 0);
+                let logs = observe(&sampler, &scene, frame, |light| light.is_multiple_of(3));
                 sampler.end_frame(&scene, &logs);
             }
             check(&sampler, &scene, &points(16, 5));
@@ -215,7 +215,7 @@ mod tests {
         let scene = scene_of(mixed_lights(200, 3));
         let mut whole = TreeVisibleSampler::new(&scene.lights, &Settings::default());
         let mut tiles = TreeVisibleSampler::new(&scene.lights, &Settings::default());
-        let logs = observe(&whole, &scene, 0, |light| light % 2 == 0);
+        let logs = observe(&whole, &scene, 0, |light| light.is_multiple_of(2));
         whole.end_frame(&scene, &[logs.concat()]);
         tiles.end_frame(&scene, &logs);
         let weights = |s: &TreeVisibleSampler| {

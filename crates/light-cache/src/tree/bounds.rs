@@ -230,7 +230,7 @@ impl LeafLight {
     /// Zero only where the light has ended; a little more than exact next to there.
     #[inline]
     pub(crate) fn attenuation(&self, distance: f32, cos_axis: f32) -> f32 {
-        let cone = cos_axis.mul_add(self.cone_scale, self.cone_offset);
+        let cone = cos_axis * self.cone_scale + self.cone_offset;
         let relative_sq = distance * distance * self.inverse_range_sq;
         let window = 1.0 - relative_sq * relative_sq;
         if cone <= -1e-4 * self.cone_scale || window <= -1e-4 {

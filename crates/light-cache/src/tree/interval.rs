@@ -38,7 +38,8 @@ pub(crate) fn split(width: u64, first: f32, second: f32) -> u64 {
         };
     }
     // The smaller ratio keeps its full f32 precision; the larger takes what is left.
-    let ratio = (smaller / (first + second) * 4_294_967_296.0) as u64;
+    // At most 2^31; by way of i64, which costs fewer instructions.
+    let ratio = (smaller / (first + second) * 4_294_967_296.0) as i64 as u64;
     let part = ((u128::from(width) * u128::from(ratio)) >> 32) as u64;
     let part = part.max(1).min(width.saturating_sub(1));
     if first <= second { part } else { width - part }
