@@ -1,5 +1,7 @@
 //! The cross-crate tests, one binary.
 
+/// The program as people and scripts meet it.
+mod cli;
 /// Scenes whose image is known in closed form.
 mod closed_form;
 /// What must hold for any scene: invariances, degenerate inputs, threads, probabilities.

@@ -80,7 +80,7 @@ pub(crate) struct LightArgs {
           value_parser = share)]
     pub(crate) min_probability_mass: f32,
     /// BIASED: ignore lights whose learned importance is below this share of the mean; 0 = off
-    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = not_negative)]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, default_value_t = 0.0, value_parser = not_negative)]
     pub(crate) ignore_below: f32,
 }
 
@@ -91,7 +91,7 @@ pub(crate) struct BudgetArgs {
     #[arg(long, value_name = "N", alias = "samples", value_parser = clap::value_parser!(u64).range(1..))]
     pub(crate) spp: Option<u64>,
     /// Seconds of rendering; loading and building come on top and are reported
-    #[arg(long, value_name = "SECONDS", aliases = ["time-limit"], value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, aliases = ["time-limit"], value_parser = seconds)]
     pub(crate) time: Option<f64>,
 }
 

@@ -5,7 +5,7 @@ use crate::session::{self, Budget};
 use crate::{machine, message, output, table};
 use anyhow::{Context, Result, bail};
 use render::image::{self, Channel};
-use render::{Image, Method, Settings};
+use render::{Image, ImageError, Method, Settings};
 use scene::{Camera, Scene};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write;
@@ -27,7 +27,7 @@ pub(super) struct Facts {
     pub(super) origin: String,
     /// Samples per pixel; 0 if unknown.
     pub(super) spp: u64,
-    /// Its own expected relMSE by its variance, in the units of [`render::ImageError::relmse`]; `None` if unknown. This
+    /// Its own expected relMSE, in the units of [`render::ImageError::relmse`]; `None` if unknown. This
     /// much is part of every error measured against it.
     pub(super) own_relmse: Option<f64>,
 }
@@ -104,16 +104,20 @@ impl Reference {
             seconds: None,
         };
         let what = format!("reference of {}, kept for next time", scene.parts.name);
-        session::render_frames(frames.as_mut(), budget, watch, &what, |_| {});
+        let mut half = None;
+        session::render_frames(frames.as_mut(), budget, watch, &what, |state| {
+            if state.film().spp() == spp / 2 {
+                half = Some(state.film().image());
+            }
+        });
         if watch.stopped() {
             return Ok(None);
         }
-        let film = frames.film();
-        let image = film.image();
+        let image = frames.film().image();
         let facts = Facts {
             origin: format!("exact, {spp} samples per pixel, manylight {}", machine::VERSION),
             spp,
-            own_relmse: Some(own_relmse(&image, &film.variance())),
+            own_relmse: half.and_then(|half| own_relmse(&image, &half, spp)),
         };
         std::fs::create_dir_all(cache).with_context(|| format!("{}: cannot make the cache folder", cache.display()))?;
         // The image first: without its facts a cached image does not count.
@@ -145,16 +149,21 @@ fn from_cache(image: &Path, facts: &Path) -> Option<Reference> {
     Some(Reference { image, facts })
 }
 
-/// What relMSE a perfect image would show against this one: mean(variance / (r^2 + 0.01 mean(r)^2)).
-fn own_relmse(image: &Image, variance: &[f32]) -> f64 {
-    let of = |pixel: &[f32; 3]| f64::from(scene::luminance((*pixel).into()));
-    let pixels = image.pixels.len().max(1) as f64;
-    let mean = image.pixels.iter().map(of).sum::<f64>() / pixels;
-    let relative = image.pixels.iter().zip(variance).map(|(pixel, &variance)| {
-        let scale = of(pixel).powi(2) + 0.01 * mean * mean;
-        if scale > 0.0 { f64::from(variance) / scale } else { 0.0 }
-    });
-    relative.sum::<f64>() / pixels
+/// What relMSE a perfect image would show against `image`, by how far its first half and the rest are apart: these are
+/// independent, and each has twice the variance of the whole. Unlike the pixels' variances this sees rare events, such
+/// as a small lamp at the border of a pixel, that one half has missed.
+fn own_relmse(image: &Image, half: &Image, spp: u64) -> Option<f64> {
+    let first = (spp / 2) as f32 / spp as f32;
+    let rest = |(whole, half): (&[f32; 3], &[f32; 3])| {
+        // Never below 0, whatever rounding does.
+        std::array::from_fn(|c| ((whole[c] - first * half[c]) / (1.0 - first)).max(0.0))
+    };
+    let other = Image {
+        pixels: image.pixels.iter().zip(&half.pixels).map(rest).collect(),
+        width: image.width,
+        height: image.height,
+    };
+    Some(ImageError::between(half, &other)?.relmse / 4.0)
 }
 
 /// Names a reference by all that its pixels depend on: the scene's content, the camera, the settings, the version.
