@@ -16,6 +16,10 @@ const MAX_SAMPLES_OF_GROUP: f32 = 64.0;
 const MEMORY: f32 = 65_536.0;
 /// A contribution above this many times the light's mean counts as that many.
 const SPIKE: f32 = 4.0;
+/// Least prior: evidence of a group is also evidence of the groups around it, and to count it at every level would make a dark corner
+/// of the tree darker with every level. Higher values keep lights that are rarely visible; lower values spend less on
+/// hidden ones.
+const MIN_PRIOR: f32 = 0.01;
 /// No share is believed to be smaller: keeps sums over a tree within the range of `f32`.
 const MIN_VISIBLE: f32 = 1e-9;
 
@@ -28,7 +32,7 @@ struct Evidence {
 
 impl Evidence {
     fn share(self, prior: f32) -> f32 {
-        (self.visible + PRIOR_SAMPLES * prior) / (self.samples + PRIOR_SAMPLES)
+        (self.visible + PRIOR_SAMPLES * prior.max(MIN_PRIOR)) / (self.samples + PRIOR_SAMPLES)
     }
 
     fn at_most(self, samples: f32) -> Self {
@@ -179,7 +183,8 @@ impl Visibility {
     }
 }
 
-/// By what a light's strength is multiplied.
+/// By what a light's strength is multiplied: the root of its visible share, since a light that is visible with probability q has
+/// q times the second moment (Rath et al. 2020).
 fn light_factor(seen: &Seen, prior: f32) -> f32 {
     let share = seen.evidence.share(prior);
     let alive = if seen.evidence.visible > 0.0 {
