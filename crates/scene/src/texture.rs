@@ -4,7 +4,7 @@ use glam::{IVec2, Vec2, Vec4};
 use std::sync::LazyLock;
 
 /// How texture coordinates outside \[0, 1) are read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Wrap {
     /// Repeat the image.
     #[default]

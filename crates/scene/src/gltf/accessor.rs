@@ -1,43 +1,11 @@
 //! Typed arrays in buffers. Every range is checked when an accessor is opened, so that reading cannot fail.
 
+use super::json::{self, Checked, ComponentType, Index, Type, View};
 use super::source::Source;
 use crate::SceneError;
 
 /// Elements that an accessor without any bytes (all zeros) may claim in a small file.
 const FREE_ZEROS: u64 = 1 << 16;
-
-/// Type of one component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
-}
-
-impl Component {
-    fn from_gl(code: u32) -> Option<Self> {
-        Some(match code {
-            5120 => Self::I8,
-            5121 => Self::U8,
-            5122 => Self::I16,
-            5123 => Self::U16,
-            5125 => Self::U32,
-            5126 => Self::F32,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> u64 {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::U32 | Self::F32 => 4,
-        }
-    }
-}
 
 /// Elements at equal distances in bytes that are known to be there.
 #[derive(Clone, Copy, Debug)]
@@ -52,11 +20,11 @@ impl Strided<'_> {
         self.bytes[start..start + N].try_into().expect("N bytes")
     }
 
-    fn unsigned(&self, element: usize, component: Component) -> u32 {
+    fn unsigned(&self, element: usize, component: ComponentType) -> u32 {
         match component {
-            Component::U8 | Component::I8 => u32::from(self.at::<1>(element, 0)[0]),
-            Component::U16 | Component::I16 => u32::from(u16::from_le_bytes(self.at(element, 0))),
-            Component::U32 | Component::F32 => u32::from_le_bytes(self.at(element, 0)),
+            ComponentType::U8 | ComponentType::I8 => u32::from(self.at::<1>(element, 0)[0]),
+            ComponentType::U16 | ComponentType::I16 => u32::from(u16::from_le_bytes(self.at(element, 0))),
+            ComponentType::U32 | ComponentType::F32 => u32::from_le_bytes(self.at(element, 0)),
         }
     }
 }
@@ -66,7 +34,7 @@ impl Strided<'_> {
 pub(super) struct Accessor<'a> {
     count: usize,
     width: usize,
-    component: Component,
+    component: ComponentType,
     normalized: bool,
     /// `None`: zeros.
     dense: Option<Strided<'a>>,
@@ -75,36 +43,46 @@ pub(super) struct Accessor<'a> {
 }
 
 impl<'a> Accessor<'a> {
-    /// Opens accessor `index`, wanted as `what` (for messages) in one of the `shapes` ("VEC3").
+    /// Opens accessor `index`, wanted as `what` (for messages) in one of the `shapes`.
     ///
     /// # Errors
     /// [`SceneError::Invalid`] if it does not exist, has another shape, or claims more than its buffers hold.
-    pub(super) fn open(source: &'a Source, index: usize, what: &str, shapes: &[&str]) -> Result<Self, SceneError> {
+    pub(super) fn open(
+        source: &'a Source,
+        index: Index<json::Accessor>,
+        what: &str,
+        shapes: &[Type],
+    ) -> Result<Self, SceneError> {
+        let index = index.value();
         let all = &source.json.accessors;
         let json = all
             .get(index)
             .ok_or_else(|| source.no_such(what, "accessor", index, all.len()))?;
         let place = format!("accessor {index} ({what})");
         let bad = |problem: String| source.invalid(&place, problem, "the file is damaged: export it again");
-        if !shapes.contains(&json.shape.as_str()) {
-            return Err(bad(format!("type '{}' instead of {}", json.shape, shapes.join(" or "))));
-        }
-        let width = match json.shape.as_str() {
-            "SCALAR" => 1,
-            "VEC2" => 2,
-            "VEC3" => 3,
-            _ => 4,
+        let Checked::Valid(shape) = json.type_ else {
+            return Err(bad("unknown type".into()));
         };
-        let component = Component::from_gl(json.component_type)
-            .ok_or_else(|| bad(format!("componentType {} is unknown", json.component_type)))?;
-        let element = component.size() * width;
-        if json.count > u64::from(u32::MAX) {
-            return Err(bad(format!("claims {} elements", json.count)));
+        if !shapes.contains(&shape) {
+            let names = shapes.iter().map(|&shape| name(shape)).collect::<Vec<_>>();
+            let problem = format!("type '{}' instead of {}", name(shape), names.join(" or "));
+            return Err(bad(problem));
         }
-        let strided = |view: usize, offset: u64, count: u64, element: u64| -> Result<Strided<'a>, SceneError> {
+        let Checked::Valid(component) = json.component_type else {
+            return Err(bad("unknown componentType".into()));
+        };
+        let (component, width) = (component.0, shape.multiplicity());
+        let element = (component.size() * width) as u64;
+        let count = json.count.0;
+        if count > u64::from(u32::MAX) {
+            return Err(bad(format!("claims {count} elements")));
+        }
+        let strided = |view: Index<View>, offset: u64, count: u64, element: u64| -> Result<Strided<'a>, SceneError> {
             let bytes = source.view(view, &place)?;
             // `view` has found it, so it is there.
-            let stride = source.json.buffer_views[view].byte_stride.unwrap_or(element);
+            let stride = source.json.buffer_views[view.value()]
+                .byte_stride
+                .map_or(element, |stride| stride.0 as u64);
             if stride < element {
                 return Err(bad(format!(
                     "byteStride {stride} is less than an element of {element} bytes"
@@ -128,42 +106,35 @@ impl<'a> Accessor<'a> {
             }
         };
         let dense = match json.buffer_view {
-            Some(view) => Some(strided(view, json.byte_offset, json.count, element)?),
-            None if json.count > source.bytes.max(FREE_ZEROS) => {
-                return Err(bad(format!("claims {} elements without any data", json.count)));
+            Some(view) => Some(strided(view, json.byte_offset.unwrap_or_default().0, count, element)?),
+            None if count > source.bytes.max(FREE_ZEROS) => {
+                return Err(bad(format!("claims {count} elements without any data")));
             }
             None => None,
         };
         let sparse = match &json.sparse {
             None => None,
             Some(sparse) => {
-                if sparse.count > json.count {
-                    return Err(bad(format!(
-                        "{} sparse values for {} elements",
-                        sparse.count, json.count
-                    )));
+                let (indices, values, few) = (&sparse.indices, &sparse.values, sparse.count.0);
+                if few > count {
+                    return Err(bad(format!("{few} sparse values for {count} elements")));
                 }
-                let kind = Component::from_gl(sparse.indices.component_type)
-                    .filter(|kind| matches!(kind, Component::U8 | Component::U16 | Component::U32))
-                    .ok_or_else(|| bad("sparse indices are not unsigned integers".into()))?;
-                let indices = &sparse.indices;
-                let raw = strided(indices.buffer_view, indices.byte_offset, sparse.count, kind.size())?;
-                let values = strided(
-                    sparse.values.buffer_view,
-                    sparse.values.byte_offset,
-                    sparse.count,
-                    element,
-                )?;
-                let numbers: Vec<u32> = (0..sparse.count as usize).map(|i| raw.unsigned(i, kind)).collect();
-                if !numbers.is_sorted_by(|a, b| a < b) || numbers.last().is_some_and(|&n| u64::from(n) >= json.count) {
+                let Checked::Valid(kind) = indices.component_type else {
+                    return Err(bad("sparse indices are not unsigned integers".into()));
+                };
+                let kind = kind.0;
+                let raw = strided(indices.buffer_view, indices.byte_offset.0, few, kind.size() as u64)?;
+                let values = strided(values.buffer_view, values.byte_offset.0, few, element)?;
+                let numbers: Vec<u32> = (0..few as usize).map(|i| raw.unsigned(i, kind)).collect();
+                if !numbers.is_sorted_by(|a, b| a < b) || numbers.last().is_some_and(|&n| u64::from(n) >= count) {
                     return Err(bad("sparse indices are not increasing, or out of range".into()));
                 }
                 Some((numbers, values))
             }
         };
         Ok(Self {
-            count: json.count as usize,
-            width: width as usize,
+            count: count as usize,
+            width,
             component,
             normalized: json.normalized,
             dense,
@@ -178,12 +149,15 @@ impl<'a> Accessor<'a> {
 
     /// Whether the components are what indices may be.
     pub(super) fn is_unsigned(&self) -> bool {
-        matches!(self.component, Component::U8 | Component::U16 | Component::U32)
+        matches!(
+            self.component,
+            ComponentType::U8 | ComponentType::U16 | ComponentType::U32
+        )
     }
 
     /// Whether the components are 32-bit integers, which no attribute may have.
     pub(super) fn is_u32(&self) -> bool {
-        self.component == Component::U32
+        self.component == ComponentType::U32
     }
 
     /// Element `i` as an unsigned integer. `i < len()`.
@@ -201,12 +175,12 @@ impl<'a> Accessor<'a> {
         let low = if self.normalized { -1.0 } else { f32::NEG_INFINITY };
         for (k, value) in out[..self.width].iter_mut().enumerate() {
             *value = match self.component {
-                Component::F32 => f32::from_le_bytes(bytes.at(i, 4 * k)),
-                Component::U32 => u32::from_le_bytes(bytes.at(i, 4 * k)) as f32,
-                Component::I8 => (f32::from(i8::from_le_bytes(bytes.at(i, k))) / unit(127.0)).max(low),
-                Component::U8 => f32::from(u8::from_le_bytes(bytes.at(i, k))) / unit(255.0),
-                Component::I16 => (f32::from(i16::from_le_bytes(bytes.at(i, 2 * k))) / unit(32767.0)).max(low),
-                Component::U16 => f32::from(u16::from_le_bytes(bytes.at(i, 2 * k))) / unit(65535.0),
+                ComponentType::F32 => f32::from_le_bytes(bytes.at(i, 4 * k)),
+                ComponentType::U32 => u32::from_le_bytes(bytes.at(i, 4 * k)) as f32,
+                ComponentType::I8 => (f32::from(i8::from_le_bytes(bytes.at(i, k))) / unit(127.0)).max(low),
+                ComponentType::U8 => f32::from(u8::from_le_bytes(bytes.at(i, k))) / unit(255.0),
+                ComponentType::I16 => (f32::from(i16::from_le_bytes(bytes.at(i, 2 * k))) / unit(32767.0)).max(low),
+                ComponentType::U16 => f32::from(u16::from_le_bytes(bytes.at(i, 2 * k))) / unit(65535.0),
             };
         }
         out
@@ -225,4 +199,9 @@ impl<'a> Accessor<'a> {
         }
         (self.dense, i)
     }
+}
+
+/// As the file calls it.
+fn name(shape: Type) -> String {
+    format!("{shape:?}").to_uppercase()
 }

@@ -29,7 +29,9 @@ pub(super) fn read(
     let mut names = BTreeSet::new();
     for node in placed {
         let json = &source.json.nodes[node.node];
-        let Some(index) = json.camera else { continue };
+        let Some(index) = json.camera.map(|camera| camera.value()) else {
+            continue;
+        };
         let place = label(source, node.node);
         let camera = all
             .get(index)

@@ -1,9 +1,19 @@
 //! What the file has and this renderer does not: counted for the report, or refused.
 
-use super::json::{Root, TextureRef};
+use super::json::Root;
 use super::source::Source;
 use crate::{Report, SceneError};
 use std::collections::BTreeSet;
+
+/// Calls `$count` for the name of every extension of `$objects` that [`Root`] has no record of.
+macro_rules! count_extensions {
+    ($count:ident, $objects:expr) => {
+        ($objects.into_iter())
+            .filter_map(|object| object.extensions.as_ref())
+            .flat_map(|extensions| extensions.others.keys())
+            .for_each(&mut $count)
+    };
+}
 
 /// Extensions that are done in full, or, with what is missing reported, well enough to show a file that requires them.
 const SUPPORTED: [&str; 9] = [
@@ -17,6 +27,9 @@ const SUPPORTED: [&str; 9] = [
     "KHR_mesh_quantization",
     "KHR_texture_transform",
 ];
+
+/// Supported ones that [`super::json`] finds without a record of the `gltf` crate.
+const WITHOUT_RECORD: [&str; 2] = ["EXT_mesh_gpu_instancing", "KHR_texture_transform"];
 
 /// Refuses a file that requires what is not supported.
 ///
@@ -43,39 +56,31 @@ pub(super) fn refuse_required(source: &Source) -> Result<(), SceneError> {
 /// used (modes, morph targets, blending) is counted by whoever reads it.
 pub(super) fn count_ignored(json: &Root, report: &mut Report) {
     let mut seen = BTreeSet::new();
-    let mut count = |names: &[String]| {
-        for name in names {
-            seen.insert(name.clone());
+    let mut count = |name: &String| {
+        seen.insert(name.clone());
+        if !WITHOUT_RECORD.contains(&name.as_str()) {
             report.ignore(name);
         }
     };
-    count(&json.extensions.others);
-    json.scenes.iter().for_each(|o| count(&o.extensions.others));
-    json.nodes.iter().for_each(|o| count(&o.extensions.others));
-    json.meshes.iter().for_each(|o| count(&o.extensions.others));
-    json.meshes
-        .iter()
-        .flat_map(|o| &o.primitives)
-        .for_each(|o| count(&o.extensions.others));
-    json.accessors.iter().for_each(|o| count(&o.extensions.others));
-    json.buffer_views.iter().for_each(|o| count(&o.extensions.others));
-    json.buffers.iter().for_each(|o| count(&o.extensions.others));
-    json.textures.iter().for_each(|o| count(&o.extensions.others));
-    json.images.iter().for_each(|o| count(&o.extensions.others));
-    json.samplers.iter().for_each(|o| count(&o.extensions.others));
-    json.cameras.iter().for_each(|o| count(&o.extensions.others));
+    count_extensions!(count, [json]);
+    count_extensions!(count, &json.scenes);
+    count_extensions!(count, &json.nodes);
+    count_extensions!(count, &json.meshes);
+    count_extensions!(count, json.meshes.iter().flat_map(|mesh| &mesh.primitives));
+    count_extensions!(count, &json.accessors);
+    count_extensions!(count, &json.buffer_views);
+    count_extensions!(count, &json.buffers);
+    count_extensions!(count, &json.textures);
+    count_extensions!(count, &json.images);
+    count_extensions!(count, &json.samplers);
+    count_extensions!(count, &json.cameras);
+    count_extensions!(count, &json.materials);
     for material in &json.materials {
-        count(&material.extensions.others);
         let pbr = &material.pbr_metallic_roughness;
-        [
-            &pbr.base_color_texture,
-            &pbr.metallic_roughness_texture,
-            &material.normal_texture,
-            &material.emissive_texture,
-        ]
-        .into_iter()
-        .flatten()
-        .for_each(|o: &TextureRef| count(&o.extensions.others));
+        count_extensions!(count, &pbr.base_color_texture);
+        count_extensions!(count, &pbr.metallic_roughness_texture);
+        count_extensions!(count, &material.normal_texture);
+        count_extensions!(count, &material.emissive_texture);
     }
     // Those that stand where we do not look, or are of no use to any object of the file.
     for name in &json.extensions_used {

@@ -1,7 +1,7 @@
 //! A glTF mesh as one [`Mesh`] in its local space.
 
 use super::accessor::Accessor;
-use super::json::{self, Primitive};
+use super::json::{self, Checked, Mode, Primitive, Semantic, Type};
 use super::materials::Needs;
 use super::merge::append;
 use super::source::Source;
@@ -55,15 +55,15 @@ pub(super) fn read_mesh(
     };
     for (number, primitive) in json.primitives.iter().enumerate() {
         let place = format!("mesh {index} '{}' primitive {number}", mesh.name);
+        let material = (primitive.material).map_or(needs.len() - 1, |material| material.value());
         let reader = PrimitiveReader {
             source,
             primitive,
             place,
-            needs: needs[primitive.material.unwrap_or(needs.len() - 1)],
+            needs: needs[material],
         };
         if let Some(part) = reader.read(budget, report)? {
-            let material = primitive.material.unwrap_or(needs.len() - 1) as u32;
-            mesh.materials.extend(std::iter::repeat_n(material, part.len()));
+            mesh.materials.extend(std::iter::repeat_n(material as u32, part.len()));
             append(&mut mesh, &part, None);
         }
     }
@@ -75,6 +75,14 @@ pub(super) fn mesh_name(index: usize, json: &json::Mesh) -> String {
     json.name.clone().unwrap_or_else(|| format!("mesh {index}"))
 }
 
+/// Whether primitives of this mode are drawn.
+pub(super) fn has_triangles(mode: Checked<Mode>) -> bool {
+    matches!(
+        mode,
+        Checked::Valid(Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)
+    )
+}
+
 struct PrimitiveReader<'a> {
     source: &'a Source,
     primitive: &'a Primitive,
@@ -84,26 +92,24 @@ struct PrimitiveReader<'a> {
 
 impl<'a> PrimitiveReader<'a> {
     fn read(&self, budget: &mut Budget, report: &mut Report) -> Result<Option<Mesh>, SceneError> {
-        let mode = self.primitive.mode.unwrap_or(4);
-        match mode {
-            0 => report.ignore("primitives of points"),
-            1..=3 => report.ignore("primitives of lines"),
-            4..=6 => {}
-            _ => return Err(self.invalid(format!("mode {mode} is unknown"))),
-        }
-        if mode < 4 {
+        let Checked::Valid(mode) = self.primitive.mode else {
+            return Err(self.invalid("unknown mode"));
+        };
+        if !has_triangles(self.primitive.mode) {
+            let what = if mode == Mode::Points { "points" } else { "lines" };
+            report.ignore(format!("primitives of {what}"));
             return Ok(None);
         }
-        if !self.primitive.targets.is_empty() {
+        if self.primitive.targets.iter().flatten().next().is_some() {
             report.ignore("morph targets");
         }
-        let Some(positions) = self.attribute("POSITION", &["VEC3"])? else {
+        let Some(positions) = self.attribute(Semantic::Positions, &[Type::Vec3])? else {
             report.warn(format!("{}: no POSITION, left out", self.place));
             return Ok(None);
         };
         let corners = self.corners(positions.len(), budget)?;
         let mut triangles = assemble(mode, &corners);
-        if mode == 4 && corners.len() % 3 != 0 {
+        if mode == Mode::Triangles && corners.len() % 3 != 0 {
             report.warn(format!(
                 "{}: {} indices are no multiple of 3",
                 self.place,
@@ -121,17 +127,17 @@ impl<'a> PrimitiveReader<'a> {
             indices: triangles,
             ..Mesh::default()
         };
-        if let Some(normals) = self.attribute("NORMAL", &["VEC3"])? {
+        if let Some(normals) = self.attribute(Semantic::Normals, &[Type::Vec3])? {
             let read = |v: [f32; 4]| Vec3::new(v[0], v[1], v[2]).normalize_or_zero();
             mesh.normals = self.stream("NORMAL", &normals, positions.len(), &used, read)?;
         }
         let uv = |v: [f32; 4]| finite2(Vec2::new(v[0], v[1]));
         for (set, stream) in [(0, &mut mesh.uvs), (1, &mut mesh.uvs1)] {
-            let name = ["TEXCOORD_0", "TEXCOORD_1"][set];
+            let name = &format!("TEXCOORD_{set}");
             if self.needs.uv_sets & 1 << set == 0 {
                 continue;
             }
-            match self.attribute(name, &["VEC2"])? {
+            match self.attribute(Semantic::TexCoords(set), &[Type::Vec2])? {
                 Some(uvs) => *stream = self.stream(name, &uvs, positions.len(), &used, uv)?,
                 None => report.warn(format!(
                     "{}: its material has a texture, but there is no {name}",
@@ -139,7 +145,7 @@ impl<'a> PrimitiveReader<'a> {
                 )),
             }
         }
-        if let Some(colors) = self.attribute("COLOR_0", &["VEC3", "VEC4"])? {
+        if let Some(colors) = self.attribute(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? {
             let opaque = colors.width() == 3;
             let read = |v: [f32; 4]| Vec4::new(v[0], v[1], v[2], if opaque { 1.0 } else { v[3] });
             let clean = |v: [f32; 4]| read(v.map(|c| if c > 0.0 { c.min(1.0) } else { 0.0 }));
@@ -156,7 +162,7 @@ impl<'a> PrimitiveReader<'a> {
 
     /// glTF 2.0 section 3.7.2.1: tangents of the file count only together with normals; without, they are computed.
     fn tangents(&self, mesh: &mut Mesh, count: usize, used: &[u32], set: u8) -> Result<(), SceneError> {
-        match self.attribute("TANGENT", &["VEC4"])? {
+        match self.attribute(Semantic::Tangents, &[Type::Vec4])? {
             Some(tangents) if !mesh.normals.is_empty() => {
                 let read = |v: [f32; 4]| {
                     let direction = Vec3::new(v[0], v[1], v[2]).try_normalize().unwrap_or(Vec3::X);
@@ -169,8 +175,9 @@ impl<'a> PrimitiveReader<'a> {
         Ok(())
     }
 
-    fn attribute(&self, name: &str, shapes: &[&str]) -> Result<Option<Accessor<'a>>, SceneError> {
-        let Some(&index) = self.primitive.attributes.get(name) else {
+    fn attribute(&self, semantic: Semantic, shapes: &[Type]) -> Result<Option<Accessor<'a>>, SceneError> {
+        let name = semantic.to_string();
+        let Some(&index) = self.primitive.attributes.get(&Checked::Valid(semantic)) else {
             return Ok(None);
         };
         let accessor = Accessor::open(self.source, index, &format!("{} {name}", self.place), shapes)?;
@@ -187,7 +194,7 @@ impl<'a> PrimitiveReader<'a> {
             return Ok((0..vertices as u32).collect());
         };
         let what = format!("{} indices", self.place);
-        let indices = Accessor::open(self.source, index, &what, &["SCALAR"])?;
+        let indices = Accessor::open(self.source, index, &what, &[Type::Scalar])?;
         if !indices.is_unsigned() {
             return Err(self.invalid("indices are not unsigned integers"));
         }
@@ -216,7 +223,7 @@ impl<'a> PrimitiveReader<'a> {
                 } else {
                     "is not finite".into()
                 };
-                let accessor = self.primitive.attributes["POSITION"];
+                let accessor = self.primitive.attributes[&Checked::Valid(Semantic::Positions)];
                 Err(self.source.invalid(
                     format!("{}, accessor {accessor}", self.place),
                     format!("POSITION {vertex} is ({x}, {y}, {z}), which {problem}"),
@@ -255,10 +262,10 @@ fn finite2(v: Vec2) -> Vec2 {
 
 /// Triangles of corners by mode (glTF 2.0 section 3.7.2.1); those of strips and fans that repeat a vertex are joints
 /// and are dropped.
-fn assemble(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
+fn assemble(mode: Mode, corners: &[u32]) -> Vec<[u32; 3]> {
     let solid = |t: &[u32; 3]| t[0] != t[1] && t[1] != t[2] && t[2] != t[0];
     match mode {
-        5 => corners
+        Mode::TriangleStrip => corners
             .windows(3)
             .enumerate()
             .map(|(i, w)| {
@@ -270,7 +277,7 @@ fn assemble(mode: u32, corners: &[u32]) -> Vec<[u32; 3]> {
             })
             .filter(solid)
             .collect(),
-        6 => corners
+        Mode::TriangleFan => corners
             .get(1..)
             .unwrap_or_default()
             .windows(2)
@@ -321,11 +328,14 @@ mod tests {
 
     #[test]
     fn strips_alternate_and_fans_turn_round_their_first_vertex() {
-        assert_eq!(assemble(5, &[0, 1, 2, 3, 4]), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
-        assert_eq!(assemble(5, &[0, 1, 2, 2, 3]), [[0, 1, 2]]);
-        assert_eq!(assemble(6, &[7, 1, 2, 3]), [[1, 2, 7], [2, 3, 7]]);
-        assert_eq!(assemble(6, &[]), [[0_u32; 3]; 0]);
-        assert_eq!(assemble(4, &[0, 1, 2, 3]), [[0, 1, 2]]);
+        assert_eq!(
+            assemble(Mode::TriangleStrip, &[0, 1, 2, 3, 4]),
+            [[0, 1, 2], [1, 3, 2], [2, 3, 4]]
+        );
+        assert_eq!(assemble(Mode::TriangleStrip, &[0, 1, 2, 2, 3]), [[0, 1, 2]]);
+        assert_eq!(assemble(Mode::TriangleFan, &[7, 1, 2, 3]), [[1, 2, 7], [2, 3, 7]]);
+        assert_eq!(assemble(Mode::TriangleFan, &[]), [[0_u32; 3]; 0]);
+        assert_eq!(assemble(Mode::Triangles, &[0, 1, 2, 3]), [[0, 1, 2]]);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Images: asked for by materials, then decoded once each, in parallel.
 
+use super::json::{self, Checked, Index, MagFilter, WrappingMode};
 use super::source::Source;
 use crate::texture::{Texture, Wrap};
 use crate::{Report, SceneError};
@@ -12,14 +13,15 @@ use std::io::Cursor;
 const MAX_SIZE: u32 = 16_384;
 /// Most texels of all images together: 2 GiB. A small file can claim huge images, and well-packed ones are huge.
 const MAX_TEXELS: u64 = 1 << 29;
+/// What the records have for a texture without a source.
+const NO_IMAGE: usize = u32::MAX as usize;
 
 /// What makes two uses of an image one texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Use {
     image: usize,
     srgb: bool,
-    /// OpenGL codes of the sampler.
-    wrap: [u32; 2],
+    wrap: [Wrap; 2],
     nearest: bool,
 }
 
@@ -36,43 +38,44 @@ impl Images {
         &mut self,
         source: &Source,
         place: &str,
-        index: usize,
+        index: Index<json::Texture>,
         srgb: bool,
         report: &mut Report,
     ) -> Result<Option<u32>, SceneError> {
-        let json = &source.json;
+        let (json, index) = (&source.json, index.value());
         let texture = json
             .textures
             .get(index)
             .ok_or_else(|| source.no_such(place, "texture", index, json.textures.len()))?;
         let what = format!("texture {index}");
-        let Some(image) = texture.source else {
+        let image = texture.source.value();
+        if image == NO_IMAGE {
             report.warn(format!("{place}: {what} names no PNG or JPEG image, left out"));
             return Ok(None);
-        };
+        }
         if image >= json.images.len() {
             return Err(source.no_such(what, "image", image, json.images.len()));
         }
         let mut key = Use {
             image,
             srgb,
-            wrap: [REPEAT; 2],
+            wrap: [Wrap::Repeat; 2],
             nearest: false,
         };
-        if let Some(number) = texture.sampler {
+        if let Some(number) = texture.sampler.map(|sampler| sampler.value()) {
             let sampler = json
                 .samplers
                 .get(number)
                 .ok_or_else(|| source.no_such(what, "sampler", number, json.samplers.len()))?;
-            key.wrap = [sampler.wrap_s, sampler.wrap_t].map(|code| code.unwrap_or(REPEAT));
-            key.nearest = sampler.mag_filter == Some(NEAREST);
-            if key.wrap.iter().any(|&code| wrap(code).is_none()) {
+            let (Checked::Valid(s), Checked::Valid(t)) = (sampler.wrap_s, sampler.wrap_t) else {
                 return Err(source.invalid(
                     format!("sampler {number}"),
                     "unknown wrapping mode",
                     "export the file again",
                 ));
-            }
+            };
+            key.wrap = [s, t].map(wrap);
+            key.nearest = sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest));
         }
         let next = self.numbers.len() as u32;
         Ok(Some(*self.numbers.entry(key).or_insert(next)))
@@ -130,22 +133,18 @@ impl Images {
     }
 }
 
-const NEAREST: u32 = 9728;
-const REPEAT: u32 = 10497;
-
-fn wrap(code: u32) -> Option<Wrap> {
-    match code {
-        REPEAT => Some(Wrap::Repeat),
-        33648 => Some(Wrap::Mirror),
-        33071 => Some(Wrap::Clamp),
-        _ => None,
+fn wrap(mode: WrappingMode) -> Wrap {
+    match mode {
+        WrappingMode::Repeat => Wrap::Repeat,
+        WrappingMode::MirroredRepeat => Wrap::Mirror,
+        WrappingMode::ClampToEdge => Wrap::Clamp,
     }
 }
 
 fn finish(texture: Texture, key: &Use) -> Texture {
     Texture {
         srgb: key.srgb,
-        wrap: key.wrap.map(|code| wrap(code).unwrap_or_default()),
+        wrap: key.wrap,
         nearest: key.nearest,
         ..texture
     }

@@ -1,12 +1,12 @@
 //! `KHR_lights_punctual`.
 
 use super::geometry::MAX_COORDINATE;
-use super::json::{PunctualKind, PunctualLight};
+use super::json::{self, Checked, LightType};
 use super::nodes::{Placed, label};
 use super::source::Source;
 use crate::{Light, LightKind, LightSource, PrimitiveId, Report, SceneError, luminance};
 use glam::Vec3;
-use std::f32::consts::{FRAC_PI_2, PI};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// The punctual lights of the placed nodes.
 ///
@@ -17,21 +17,20 @@ pub(super) fn read(
     placed: &[Placed],
     report: &mut Report,
 ) -> Result<Vec<(Light, LightSource)>, SceneError> {
-    let lights = source.json.extensions.lights.as_ref().map_or(&[][..], |l| &l.lights);
+    let lights: &[json::Light] = source.json.as_ref();
     let mut read = Vec::new();
     for node in placed {
         let json = &source.json.nodes[node.node];
-        let Some(reference) = &json.extensions.light else {
+        let extensions = json.extensions.as_ref();
+        let Some(reference) = extensions.and_then(|e| e.khr_lights_punctual.as_ref()) else {
             continue;
         };
+        let index = reference.light.value();
         let place = label(source, node.node);
         let light = lights
-            .get(reference.light)
-            .ok_or_else(|| source.no_such(&place, "light", reference.light, lights.len()))?;
-        let name = light
-            .name
-            .clone()
-            .unwrap_or_else(|| format!("light {}", reference.light));
+            .get(index)
+            .ok_or_else(|| source.no_such(&place, "light", index, lights.len()))?;
+        let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
         if let Some(record) = record(light, node, &format!("{place}, light '{name}'"), report) {
             let origin = LightSource {
                 node: json.name.clone().unwrap_or(place),
@@ -45,17 +44,17 @@ pub(super) fn read(
     Ok(read)
 }
 
-fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report) -> Option<Light> {
-    let kind = match json.kind {
-        PunctualKind::Point => LightKind::Point,
-        PunctualKind::Spot => LightKind::Spot,
-        PunctualKind::Directional => LightKind::Directional,
-        PunctualKind::Unknown => {
+fn record(json: &json::Light, node: &Placed, place: &str, report: &mut Report) -> Option<Light> {
+    let kind = match json.type_ {
+        Checked::Valid(LightType::Point) => LightKind::Point,
+        Checked::Valid(LightType::Spot) => LightKind::Spot,
+        Checked::Valid(LightType::Directional) => LightKind::Directional,
+        Checked::Invalid => {
             report.ignore("punctual lights of an unknown type");
             return None;
         }
     };
-    let intensity = Vec3::from(json.color.unwrap_or([1.0; 3])) * json.intensity.unwrap_or(1.0);
+    let intensity = Vec3::from(json.color) * json.intensity;
     let clean = Vec3::from(
         intensity
             .to_array()
@@ -129,16 +128,16 @@ fn record(json: &PunctualLight, node: &Placed, place: &str, report: &mut Report)
 }
 
 /// Cosines of the inner and outer angle, 0 <= inner < outer <= pi/2.
-fn cone(json: &PunctualLight, place: &str, report: &mut Report) -> (f32, f32) {
-    let (inner, outer) = (json.spot.inner_cone_angle, json.spot.outer_cone_angle);
+fn cone(json: &json::Light, place: &str, report: &mut Report) -> (f32, f32) {
+    let angles = json
+        .spot
+        .as_ref()
+        .map(|spot| (spot.inner_cone_angle, spot.outer_cone_angle));
+    let (inner, outer) = angles.unwrap_or((0.0, FRAC_PI_4));
     if inner >= 0.0 && inner < outer && outer <= FRAC_PI_2 + 1e-4 {
         return (inner.cos(), outer.min(FRAC_PI_2).cos().max(0.0));
     }
-    let fixed_outer = if outer > 0.0 {
-        outer.min(FRAC_PI_2)
-    } else {
-        FRAC_PI_2 / 2.0
-    };
+    let fixed_outer = if outer > 0.0 { outer.min(FRAC_PI_2) } else { FRAC_PI_4 };
     let fixed_inner = if inner > 0.0 {
         inner.min(0.99 * fixed_outer)
     } else {

@@ -1,7 +1,7 @@
 //! Materials, and what they ask of meshes and textures.
 
 use super::images::Images;
-use super::json::{self, AlphaMode};
+use super::json::{self, AlphaMode, Checked, Info, MaterialExtensions};
 use super::source::Source;
 use crate::texture::TextureRef;
 use crate::{Material, Report, SceneError};
@@ -60,20 +60,20 @@ struct MaterialReader<'a> {
     needs: Needs,
 }
 
-impl MaterialReader<'_> {
+impl<'a> MaterialReader<'a> {
     fn read(&mut self, name: String) -> Result<Material, SceneError> {
         let json = self.json;
         let pbr = &json.pbr_metallic_roughness;
-        let unlit = json.extensions.unlit.is_some();
+        let unlit = self.is_unlit();
         if unlit && self.used {
             self.report
                 .ignore("KHR_materials_unlit (shown as a lit, rough surface of its base colour)");
         }
-        let [r, g, b, a] = pbr.base_color_factor;
+        let [r, g, b, a] = pbr.base_color_factor.0;
         let base_color = Vec3::from(self.unit("baseColorFactor", [r, g, b]));
         let [metallic, roughness, alpha] = self.unit(
             "metallicFactor, roughnessFactor or alpha",
-            [pbr.metallic_factor, pbr.roughness_factor, a],
+            [pbr.metallic_factor.0, pbr.roughness_factor.0, a],
         );
         let (dielectric_f0, dielectric_f90) = if unlit { (Vec3::ZERO, 0.0) } else { self.dielectric() };
         let emission = self.emission();
@@ -84,12 +84,12 @@ impl MaterialReader<'_> {
             dielectric_f0,
             dielectric_f90,
             emission,
-            alpha_cutoff: self.alpha_cutoff(),
+            alpha_cutoff: self.alpha_cutoff()?,
             alpha,
             double_sided: json.double_sided,
             ..Material::lambert(&name, base_color)
         };
-        if let Some(archived) = &json.extensions.specular_glossiness {
+        if let Some(archived) = self.extension(|e| e.pbr_specular_glossiness.as_ref()) {
             self.specular_glossiness(archived, &mut material)?;
             return Ok(material);
         }
@@ -107,12 +107,12 @@ impl MaterialReader<'_> {
     /// `KHR_materials_pbrSpecularGlossiness`, archived: a dielectric of any reflectance says the same, but for the texture.
     fn specular_glossiness(
         &mut self,
-        json: &json::SpecularGlossiness,
+        json: &json::PbrSpecularGlossiness,
         material: &mut Material,
     ) -> Result<(), SceneError> {
-        let specular = Vec3::from(self.unit("specularFactor", json.specular_factor));
-        let [r, g, b, alpha] = self.unit("diffuseFactor", json.diffuse_factor);
-        let [glossiness] = self.unit("glossinessFactor", [json.glossiness_factor]);
+        let specular = Vec3::from(self.unit("specularFactor", json.specular_factor.0));
+        let [r, g, b, alpha] = self.unit("diffuseFactor", json.diffuse_factor.0);
+        let [glossiness] = self.unit("glossinessFactor", [json.glossiness_factor.0]);
         material.base_color = Vec3::new(r, g, b);
         material.alpha = alpha;
         material.metallic = 0.0;
@@ -131,7 +131,7 @@ impl MaterialReader<'_> {
     }
 
     fn normal_and_emission(&mut self, material: &mut Material) -> Result<(), SceneError> {
-        if self.json.extensions.unlit.is_none() {
+        if !self.is_unlit() {
             self.normal_map(material)?;
         }
         if material.emits() {
@@ -144,13 +144,14 @@ impl MaterialReader<'_> {
         let Some(json) = &self.json.normal_texture else {
             return Ok(());
         };
-        let scale = json.scale.unwrap_or(1.0);
+        let scale = json.scale;
         if !scale.is_finite() {
             self.report
                 .warn(format!("{}: normal scale {scale}, normal map left out", self.place));
         } else if scale != 0.0 {
             material.normal_scale = scale;
-            material.normal_texture = self.texture(Some(json), false)?;
+            let map = json::normal_map(json).map_err(|error| self.invalid(format!("normalTexture: {error}")))?;
+            material.normal_texture = self.texture(Some(&map), false)?;
             self.needs.tangents_for = material.normal_texture.map(|t| t.uv_set);
         }
         Ok(())
@@ -158,8 +159,7 @@ impl MaterialReader<'_> {
 
     /// Reflectance of the dielectric at normal and grazing incidence (`KHR_materials_ior`, `KHR_materials_specular`).
     fn dielectric(&mut self) -> (Vec3, f32) {
-        let extensions = &self.json.extensions;
-        let ior = extensions.ior.as_ref().map_or(1.5, |e| e.ior);
+        let ior = self.extension(|e| e.ior.as_ref()).map_or(1.5, |e| e.ior.0);
         let ior = if ior.is_finite() && (ior >= 1.0 || ior == 0.0) {
             ior
         } else {
@@ -167,7 +167,7 @@ impl MaterialReader<'_> {
             1.5
         };
         let f0 = ((ior - 1.0) / (ior + 1.0)).powi(2);
-        let Some(specular) = &extensions.specular else {
+        let Some(specular) = self.extension(|e| e.specular.as_ref()) else {
             return (Vec3::splat(f0), 1.0);
         };
         if self.used {
@@ -175,8 +175,8 @@ impl MaterialReader<'_> {
                 self.report.ignore("textures of KHR_materials_specular");
             }
         }
-        let [weight] = self.unit("specularFactor", [specular.specular_factor]);
-        let color = Vec3::from(specular.specular_color_factor);
+        let [weight] = self.unit("specularFactor", [specular.specular_factor.0]);
+        let color = Vec3::from(specular.specular_color_factor.0);
         let color = if color.is_finite() {
             color.max(Vec3::ZERO)
         } else {
@@ -187,12 +187,9 @@ impl MaterialReader<'_> {
 
     fn emission(&mut self) -> Vec3 {
         let strength = self
-            .json
-            .extensions
-            .emissive_strength
-            .as_ref()
-            .map_or(1.0, |e| e.emissive_strength);
-        let emission = Vec3::from(self.json.emissive_factor) * strength;
+            .extension(|e| e.emissive_strength.as_ref())
+            .map_or(1.0, |e| e.emissive_strength.0);
+        let emission = Vec3::from(self.json.emissive_factor.0) * strength;
         let clean = emission
             .to_array()
             .map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
@@ -205,18 +202,34 @@ impl MaterialReader<'_> {
         clean.into()
     }
 
-    fn alpha_cutoff(&mut self) -> Option<f32> {
-        match self.json.alpha_mode {
-            AlphaMode::Opaque => None,
-            AlphaMode::Mask => Some(self.json.alpha_cutoff.filter(|c| c.is_finite()).unwrap_or(0.5)),
-            AlphaMode::Blend => {
+    fn alpha_cutoff(&mut self) -> Result<Option<f32>, SceneError> {
+        Ok(match self.json.alpha_mode {
+            Checked::Invalid => return Err(self.invalid("unknown alphaMode")),
+            Checked::Valid(AlphaMode::Opaque) => None,
+            Checked::Valid(AlphaMode::Mask) => {
+                let cutoff = self.json.alpha_cutoff.unwrap_or_default().0;
+                Some(if cutoff.is_finite() { cutoff } else { 0.5 })
+            }
+            Checked::Valid(AlphaMode::Blend) => {
                 if self.used {
                     self.report
                         .ignore("alphaMode BLEND (surfaces of alpha below 0.5 are left out, others are opaque)");
                 }
                 Some(0.5)
             }
-        }
+        })
+    }
+
+    fn extension<T>(&self, pick: impl Fn(&'a MaterialExtensions) -> Option<&'a T>) -> Option<&'a T> {
+        self.json.extensions.as_ref().and_then(pick)
+    }
+
+    fn is_unlit(&self) -> bool {
+        self.extension(|e| e.unlit.as_ref()).is_some()
+    }
+
+    fn invalid(&self, problem: impl Into<String>) -> SceneError {
+        self.source.invalid(&self.place, problem, "export the file again")
     }
 
     /// Brings factors into \[0, 1\].
@@ -229,9 +242,9 @@ impl MaterialReader<'_> {
         clean
     }
 
-    fn texture(&mut self, json: Option<&json::TextureRef>, srgb: bool) -> Result<Option<TextureRef>, SceneError> {
+    fn texture(&mut self, json: Option<&Info>, srgb: bool) -> Result<Option<TextureRef>, SceneError> {
         let Some(json) = json else { return Ok(None) };
-        let transform = json.extensions.transform.as_ref();
+        let transform = json.extensions.as_ref().and_then(|e| e.texture_transform.as_ref());
         let set = transform.and_then(|t| t.tex_coord).unwrap_or(json.tex_coord);
         if set > 1 {
             self.report.ignore("textures on TEXCOORD_2 and above");
@@ -259,12 +272,12 @@ impl MaterialReader<'_> {
         let Some(json) = json else {
             return (Mat2::IDENTITY, Vec2::ZERO);
         };
-        let (sin, cos) = json.rotation.sin_cos();
+        let (sin, cos) = json.rotation.0.sin_cos();
         let columns = Mat2::from_cols(
-            Vec2::new(cos, -sin) * json.scale[0],
-            Vec2::new(sin, cos) * json.scale[1],
+            Vec2::new(cos, -sin) * json.scale.0[0],
+            Vec2::new(sin, cos) * json.scale.0[1],
         );
-        let offset = Vec2::from(json.offset);
+        let offset = Vec2::from(json.offset.0);
         if columns.is_finite() && offset.is_finite() {
             return (columns, offset);
         }

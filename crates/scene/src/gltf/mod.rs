@@ -24,6 +24,7 @@ mod tests;
 use crate::{Instance, Mesh, SceneError, SceneParts};
 use bounds::Bounds;
 use geometry::{Budget, mesh_name};
+use json::Instancing;
 use merge::{Motion, append};
 use nodes::Placed;
 use source::Source;
@@ -88,15 +89,19 @@ fn placements(source: &Source, placed: &[Placed], budget: &mut Budget) -> Result
     let mut placements = vec![Vec::new(); source.json.meshes.len()];
     for node in placed {
         let json = &source.json.nodes[node.node];
-        let Some(mesh) = json.mesh else { continue };
+        let Some(mesh) = json.mesh.map(|mesh| mesh.value()) else {
+            continue;
+        };
         let place = nodes::label(source, node.node);
         let Some(list) = placements.get_mut(mesh) else {
             return Err(source.no_such(place, "mesh", mesh, source.json.meshes.len()));
         };
-        match &json.extensions.instancing {
+        match Instancing::of(json) {
             None => list.push(*node),
             Some(instancing) => {
-                let copies = nodes::instancing(source, node.node, instancing)?;
+                let instancing = instancing
+                    .map_err(|error| source.invalid(&place, format!("instancing: {error}"), "export the file again"))?;
+                let copies = nodes::instancing(source, node.node, &instancing)?;
                 budget.take(source, &place, copies.len() as u64)?;
                 list.extend(copies.into_iter().map(|local| Placed {
                     node: node.node,
@@ -114,12 +119,12 @@ fn used_materials(source: &Source, placements: &[Vec<Placed>]) -> Result<Vec<boo
     let mut used = vec![false; count + 1];
     for (index, mesh) in source.json.meshes.iter().enumerate() {
         for (number, primitive) in mesh.primitives.iter().enumerate() {
-            let material = primitive.material.unwrap_or(count);
-            if material > count || primitive.material == Some(count) {
+            let material = primitive.material.map_or(count, |material| material.value());
+            if material >= count && primitive.material.is_some() {
                 let place = format!("mesh {index} '{}' primitive {number}", mesh_name(index, mesh));
                 return Err(source.no_such(place, "material", material, count));
             }
-            let visible = primitive.mode.is_none_or(|mode| mode >= 4) && !placements[index].is_empty();
+            let visible = geometry::has_triangles(primitive.mode) && !placements[index].is_empty();
             used[material] |= visible;
         }
     }

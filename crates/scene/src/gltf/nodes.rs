@@ -1,7 +1,7 @@
 //! The node hierarchy, walked without recursion into placements in world space.
 
 use super::accessor::Accessor;
-use super::json::{Instancing, Node};
+use super::json::{Instancing, Node, Type, UnitQuaternion};
 use super::source::Source;
 use crate::{Report, SceneError};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -26,7 +26,7 @@ pub(super) fn walk(source: &Source, report: &mut Report) -> Result<Vec<Placed>, 
     let nodes = &source.json.nodes;
     let mut parents = vec![None; nodes.len()];
     for (index, node) in nodes.iter().enumerate() {
-        for &child in &node.children {
+        for child in children(node) {
             let place = label(source, index);
             let parent = parents
                 .get_mut(child)
@@ -67,16 +67,14 @@ pub(super) fn walk(source: &Source, report: &mut Report) -> Result<Vec<Placed>, 
                 return Err(not_finite(source, index));
             }
             placed.push(Placed { node: index, world });
-            stack.extend(
-                nodes[index]
-                    .children
-                    .iter()
-                    .rev()
-                    .map(|&child| (child, world, depth + 1)),
-            );
+            stack.extend(children(&nodes[index]).rev().map(|child| (child, world, depth + 1)));
         }
     }
     Ok(placed)
+}
+
+fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
+    node.children.iter().flatten().map(|child| child.value())
 }
 
 /// How messages and origins call a node.
@@ -89,7 +87,7 @@ pub(super) fn label(source: &Source, index: usize) -> String {
 
 /// Placements of a node's mesh under `EXT_mesh_gpu_instancing`, relative to the node.
 pub(super) fn instancing(source: &Source, index: usize, json: &Instancing) -> Result<Vec<DAffine3>, SceneError> {
-    let open = |name: &str, shape: &str| {
+    let open = |name: &str, shape: Type| {
         let attribute = json.attributes.get(name);
         let what = format!("{} {name}", label(source, index));
         attribute
@@ -97,9 +95,9 @@ pub(super) fn instancing(source: &Source, index: usize, json: &Instancing) -> Re
             .transpose()
     };
     let streams = [
-        open("TRANSLATION", "VEC3")?,
-        open("ROTATION", "VEC4")?,
-        open("SCALE", "VEC3")?,
+        open("TRANSLATION", Type::Vec3)?,
+        open("ROTATION", Type::Vec4)?,
+        open("SCALE", Type::Vec3)?,
     ];
     let mut counts = streams.iter().flatten().map(Accessor::len);
     let Some(count) = counts.next() else {
@@ -117,7 +115,7 @@ pub(super) fn instancing(source: &Source, index: usize, json: &Instancing) -> Re
         .map(|i| {
             let node = Node {
                 translation: translation.as_ref().map(|a| first3(a.floats(i))),
-                rotation: rotation.as_ref().map(|a| a.floats(i)),
+                rotation: rotation.as_ref().map(|a| UnitQuaternion(a.floats(i))),
                 scale: scale.as_ref().map(|a| first3(a.floats(i))),
                 ..Node::default()
             };
@@ -167,7 +165,7 @@ fn refuse_cycles(source: &Source, parents: &[Option<usize>]) -> Result<(), Scene
 /// The root nodes to show: of the default scene, else of the first, else all nodes without a parent.
 fn roots(source: &Source, parents: &[Option<usize>], report: &mut Report) -> Result<Vec<usize>, SceneError> {
     let json = &source.json;
-    let index = match json.scene {
+    let index = match json.scene.map(|scene| scene.value()) {
         Some(index) if index < json.scenes.len() => index,
         Some(index) => return Err(source.no_such("scene", "scene", index, json.scenes.len())),
         None if json.scenes.is_empty() => {
@@ -181,7 +179,7 @@ fn roots(source: &Source, parents: &[Option<usize>], report: &mut Report) -> Res
     for _ in 1..json.scenes.len() {
         report.ignore("scenes other than the default one");
     }
-    let roots = json.scenes[index].nodes.clone();
+    let roots: Vec<usize> = json.scenes[index].nodes.iter().map(|node| node.value()).collect();
     match roots.iter().find(|&&node| node >= parents.len()) {
         Some(&node) => Err(source.no_such(format!("scene {index}"), "node", node, parents.len())),
         None => Ok(roots),
@@ -219,7 +217,7 @@ fn compose(node: &Node) -> (DAffine3, Option<&'static str>) {
     let vector = |v: Option<[f32; 3]>, otherwise: DVec3| v.map_or(otherwise, |v| DVec3::from_array(v.map(f64::from)));
     let (rotation, note) = match node.rotation {
         None => (DQuat::IDENTITY, None),
-        Some(q) => {
+        Some(UnitQuaternion(q)) => {
             let q = DQuat::from_array(q.map(f64::from));
             match q.length_squared() {
                 0.0 => (

@@ -1,6 +1,6 @@
 //! The file and what lies beside it: container, JSON, buffers, data URIs.
 
-use super::json::Root;
+use super::json::{self, Index, Root, View};
 use crate::SceneError;
 use std::fs::File;
 use std::io::Read;
@@ -31,7 +31,7 @@ impl Source {
         let (text, blob) = split(path, &file)?;
         // A byte order mark is not allowed, but some editors leave one.
         let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-        let json: Root = serde_json::from_slice(text).map_err(|error| {
+        let json: Root = json::parse(text).map_err(|error| {
             invalid(
                 path,
                 "JSON",
@@ -72,34 +72,36 @@ impl Source {
     }
 
     /// The bytes of a buffer view.
-    pub(super) fn view(&self, index: usize, place: &str) -> Result<&[u8], SceneError> {
-        let views = &self.json.buffer_views;
+    pub(super) fn view(&self, index: Index<View>, place: &str) -> Result<&[u8], SceneError> {
+        let (views, index) = (&self.json.buffer_views, index.value());
         let view = views
             .get(index)
             .ok_or_else(|| self.no_such(place, "bufferView", index, views.len()))?;
+        let (number, offset, length) = (
+            view.buffer.value(),
+            view.byte_offset.unwrap_or_default().0,
+            view.byte_length.0,
+        );
         let buffer = self
             .buffers
-            .get(view.buffer)
-            .ok_or_else(|| self.no_such(format!("bufferView {index}"), "buffer", view.buffer, self.buffers.len()))?;
+            .get(number)
+            .ok_or_else(|| self.no_such(format!("bufferView {index}"), "buffer", number, self.buffers.len()))?;
         let Some(buffer) = buffer else {
             return Err(self.invalid(
-                format!("buffer {}", view.buffer),
+                format!("buffer {number}"),
                 "has no URI, and there is no binary chunk for it",
                 "export the file again, with its buffers",
             ));
         };
-        let range = usize::try_from(view.byte_offset)
+        let range = usize::try_from(offset)
             .ok()
-            .zip(usize::try_from(view.byte_length).ok())
+            .zip(usize::try_from(length).ok())
             .and_then(|(start, length)| Some(start..start.checked_add(length)?));
         range.and_then(|range| buffer.get(range)).ok_or_else(|| {
             self.invalid(
                 format!("bufferView {index}"),
                 format!(
-                    "claims {} bytes at {}, but buffer {} has {}",
-                    view.byte_length,
-                    view.byte_offset,
-                    view.buffer,
+                    "claims {length} bytes at {offset}, but buffer {number} has {}",
                     buffer.len()
                 ),
                 "the file is damaged: export it again",
@@ -153,7 +155,7 @@ impl Source {
     fn read_buffers(&mut self, blob: Option<&[u8]>) -> Result<(), SceneError> {
         for index in 0..self.json.buffers.len() {
             let buffer = &self.json.buffers[index];
-            let place = format!("buffer {index}");
+            let (place, length) = (format!("buffer {index}"), buffer.byte_length.0);
             let mut data = match (&buffer.uri, index, blob) {
                 (Some(uri), _, _) => self.resolve(uri, &place)?,
                 (None, 0, Some(blob)) => blob.to_vec(),
@@ -162,17 +164,17 @@ impl Source {
                     continue;
                 }
             };
-            if (data.len() as u64) < buffer.byte_length {
+            if (data.len() as u64) < length {
                 return Err(self.invalid(
                     place,
-                    format!("claims {} bytes, but there are {}", buffer.byte_length, data.len()),
+                    format!("claims {length} bytes, but there are {}", data.len()),
                     "the buffer is cut short: copy or export it again",
                 ));
             }
             if buffer.uri.as_deref().is_some_and(|uri| !uri.starts_with("data:")) {
                 self.bytes += data.len() as u64;
             }
-            data.truncate(buffer.byte_length as usize);
+            data.truncate(length as usize);
             self.buffers.push(Some(data));
         }
         Ok(())
@@ -212,6 +214,7 @@ fn read_file(scene: &Path, file: &Path, what: &str) -> Result<Vec<u8>, SceneErro
 }
 
 /// Splits a file into JSON and binary chunk (glTF 2.0 section 4.4); a file without the magic number is all JSON.
+/// Not by `gltf::binary`, which refuses files with chunks of unknown types, and underflows on a length below 12.
 fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), SceneError> {
     if !file.starts_with(b"glTF") {
         return Ok((file, None));

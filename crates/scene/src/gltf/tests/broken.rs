@@ -127,7 +127,7 @@ fn indices_out_of_range() {
         ),
         (
             json!({ "meshes": mesh(json!({ "attributes": { "POSITION": 0 }, "mode": 9 })) }),
-            "mode 9",
+            "unknown mode",
         ),
         (json!({ "meshes": [], "nodes": [{ "mesh": 9 }] }), "mesh 9"),
         (json!({ "nodes": [{ "camera": 9 }] }), "camera 9"),
@@ -158,8 +158,8 @@ fn indices_out_of_range() {
 fn accessors_that_make_no_sense() {
     for (key, value, message) in [
         ("type", json!("VEC2"), "type 'VEC2' instead of VEC3"),
-        ("type", json!("VEC9"), "type 'VEC9'"),
-        ("componentType", json!(5124), "componentType 5124"),
+        ("type", json!("VEC9"), "unknown type"),
+        ("componentType", json!(5124), "unknown componentType"),
         ("componentType", json!(5125), "32-bit integers"),
         ("byteOffset", json!(4), "claims 3 elements"),
         ("byteOffset", json!(u64::MAX), "claims 3 elements"),
@@ -260,6 +260,53 @@ fn deep_hierarchies() {
     };
     assert!(chain(5_000).is_ok());
     refused(chain(20_000), &["levels deep"]);
+}
+
+#[test]
+fn members_that_nothing_here_depends_on_may_be_missing() {
+    let parts = triangle().load(json!({
+        "meshes": [{}, { "primitives": [{}] }, { "primitives": [{ "attributes": { "POSITION": 0 } }] }],
+        "nodes": [{ "mesh": 2 }, { "camera": 0 }],
+        "scenes": [{ "nodes": [0, 1] }, {}],
+        "cameras": [{ "perspective": { "yfov": 0.5 } }, { "orthographic": { "ymag": 1 } }],
+        "animations": [{ "channels": [{ "sampler": 0, "target": { "path": "pointer" } }], "samplers": [] }],
+        "skins": [{}],
+        "extensions": { "KHR_lights_punctual": {} },
+    }));
+    assert_eq!((parts.meshes[0].len(), parts.cameras[0].fov_y), (1, 0.5));
+    assert_eq!(parts.report.ignored["animations"], 1);
+    // Errors of such files are those that remain.
+    let file = |meshes: Value| read_json(&json!({ "asset": { "version": "2.0" }, "scenes": [{}], "meshes": meshes }));
+    refused(file(json!({})), &["JSON: invalid type: map, expected a sequence"]);
+    refused(
+        read_json(&json!({ "asset": {}, "scenes": [] })),
+        &["missing field `version` at line 1"],
+    );
+}
+
+#[test]
+fn materials_and_extensions_that_make_no_sense() {
+    let material = |material: Value| {
+        triangle().read(json!({
+            "meshes": mesh(json!({ "attributes": { "POSITION": 0 }, "material": 0 })),
+            "materials": [material],
+            "textures": [{}],
+        }))
+    };
+    refused(
+        material(json!({ "alphaMode": "GLASS", "name": "a" })),
+        &["material 0 'a'", "unknown alphaMode"],
+    );
+    let transform = json!({ "KHR_texture_transform": { "offset": 1 } });
+    refused(
+        material(json!({ "normalTexture": { "index": 0, "extensions": transform } })),
+        &["material 0", "normalTexture"],
+    );
+    let instancing = json!({ "EXT_mesh_gpu_instancing": { "attributes": 1 } });
+    refused(
+        triangle().read(json!({ "meshes": plain(), "nodes": [{ "mesh": 0, "extensions": instancing }] })),
+        &["node 0", "instancing"],
+    );
 }
 
 #[test]

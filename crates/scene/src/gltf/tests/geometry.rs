@@ -1,7 +1,9 @@
 //! Transforms, indices, modes, quantisation, sparse data, instances.
 
 use super::*;
-use glam::{Vec2, Vec3, Vec4};
+use crate::gltf::merge::{Motion, append};
+use crate::{PrimitiveId, Ray, Scene};
+use glam::{Affine3A, DAffine3, DQuat, DVec3, EulerRot, Vec2, Vec3, Vec4};
 
 fn positions(parts: &SceneParts) -> Vec<Vec3> {
     let mesh = &parts.meshes[0];
@@ -291,4 +293,51 @@ fn with_texture(primitive: Value) -> Value {
         "textures": [{ "source": 0 }],
         "images": [{ "uri": uri }],
     })
+}
+
+#[test]
+fn normal_maps_move_with_their_surface_also_when_mirrored() {
+    let mut builder = triangle();
+    let normals = builder.floats(&[[0.0, 0.0, 1.0]; 3]);
+    let uvs = builder.floats(&[[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]]);
+    let image = builder.view(&png(1, &[[200, 170, 220, 255]]));
+    let attributes = json!({ "POSITION": 0, "NORMAL": normals, "TEXCOORD_0": uvs });
+    let local = builder.load(json!({
+        "meshes": mesh(json!({ "attributes": attributes, "material": 0 })),
+        "materials": [{ "normalTexture": { "index": 0 } }],
+        "textures": [{ "source": 0 }],
+        "images": [{ "bufferView": image }],
+    }));
+    let shading_normal = |parts: SceneParts, place: Affine3A| {
+        let scene = Scene::new(parts).unwrap();
+        let ray = Ray {
+            origin_ws: place.transform_point3(Vec3::new(0.2, 0.2, 1.0)),
+            direction_ws: place.transform_vector3(-Vec3::Z).normalize(),
+            t_max: f32::INFINITY,
+        };
+        let hit = scene.nearest(&ray, PrimitiveId::NONE).unwrap();
+        scene.surface(&ray, &hit).bsdf.normal_ws
+    };
+    let before = shading_normal(local.clone(), Affine3A::IDENTITY);
+    assert!(before.x > 0.3 && before.y > 0.2, "red is right, green is up: {before}");
+    let rotation = DQuat::from_euler(EulerRot::XYZ, 0.5, -1.1, 0.3);
+    for scale in [[2, 2, 2], [-2, 2, 2], [2, -2, 2], [2, 2, -2], [-2, -2, -2]] {
+        let scale = DVec3::from_array(scale.map(f64::from));
+        let motion = Motion::new(DAffine3::from_scale_rotation_translation(scale, rotation, DVec3::ONE));
+        let mut instanced = local.clone();
+        instanced.instances = vec![motion.instance(0, 0).unwrap()];
+        let place = instanced.instances[0].world_from_local;
+        let mut copied = local.clone();
+        let original = std::mem::take(&mut copied.meshes[0]);
+        copied.meshes[0].materials.clone_from(&original.materials);
+        copied.meshes[0].origins.clone_from(&original.origins);
+        append(&mut copied.meshes[0], &original, Some(&motion));
+        let expected = place.transform_vector3(before).normalize();
+        for normal in [instanced, copied].map(|parts| shading_normal(parts, place)) {
+            assert!(
+                normal.abs_diff_eq(expected, 1e-5),
+                "{scale}: {normal} is not {expected}"
+            );
+        }
+    }
 }
