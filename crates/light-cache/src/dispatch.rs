@@ -1,8 +1,8 @@
 //! From the name of a sampler to code made for it.
 
 use crate::{
-    LightSampler, OctreeSampler, PowerSampler, SamplerKind, Settings, TableSampler, TreeSampler, TreeVisibleSampler,
-    UniformSampler,
+    AdaptiveSampler, LightSampler, OctreeSampler, PowerSampler, SamplerKind, Settings, TableSampler, TreeSampler,
+    TreeVisibleSampler, UniformSampler,
 };
 use scene::Scene;
 
@@ -29,6 +29,7 @@ pub fn build<V: Visitor>(scene: &Scene, settings: &Settings, kind: SamplerKind, 
         SamplerKind::Octree => visitor.visit(OctreeSampler::new(scene, settings)),
         SamplerKind::Tree => visitor.visit(TreeSampler::new(lights)),
         SamplerKind::TreeVisible => visitor.visit(TreeVisibleSampler::new(lights, settings)),
+        SamplerKind::Adaptive => visitor.visit(AdaptiveSampler::new(scene, settings)),
         SamplerKind::Table => visitor.visit(TableSampler::new(lights, scene.radius, settings)),
     }
 }

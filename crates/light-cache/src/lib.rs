@@ -8,6 +8,7 @@
 //! Absent from this crate: GPU handles, windows, files, ray tracing. Deterministic for a seed at any thread count:
 //! logs are merged in the order of the image's tiles.
 
+mod adaptive;
 mod belief;
 mod brightness;
 mod dispatch;
@@ -26,6 +27,7 @@ use glam::Vec3;
 use scene::Scene;
 use std::fmt::Debug;
 
+pub use adaptive::AdaptiveSampler;
 pub use dispatch::{Visitor, build};
 pub use octree::OctreeSampler;
 pub use power::PowerSampler;
@@ -67,6 +69,9 @@ pub struct Observation {
     /// being chosen for certain: path throughput x BSDF x cosine x radiance / pdf of the point on the light. Finite,
     /// at least 0.
     pub unshadowed: f32,
+    /// Luminance of the irradiance alone that goes with `unshadowed`: cosine x radiance / pdf of the point on the light,
+    /// the surface's colour and the path's weight left out. Finite, at least 0.
+    pub irradiance: f32,
     /// The probability with which the light was chosen.
     pub pmf: f32,
     /// Whether the shadow ray arrived.
@@ -122,6 +127,10 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// Whether the sampler wants observations at all; if not, the integrator collects none.
     const LEARNS: bool;
+
+    /// Tells where the eye is, before the first frame and when it has moved: samplers that keep cells make them finer
+    /// near it.
+    fn set_eye(&mut self, _eye_ws: Vec3) {}
 
     /// Prepares for `point`.
     fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_>;

@@ -124,6 +124,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.add_pmfs(local, sum);
     }
 
+    fn set_eye(&mut self, eye_ws: Vec3) {
+        self.inner.set_eye(eye_ws);
+    }
+
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
         self.inner.end_frame(scene, logs);
         self.frame += 1;

@@ -18,17 +18,20 @@ pub enum SamplerKind {
     TreeVisible,
     /// The global running-maximum importance table (Wald et al. 2003).
     Table,
+    /// Learned cuts: cells that know which lights matter where.
+    Adaptive,
 }
 
 impl SamplerKind {
     /// All of them, in the order in which tables list them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Uniform,
         Self::Power,
         Self::Octree,
         Self::Tree,
         Self::TreeVisible,
         Self::Table,
+        Self::Adaptive,
     ];
 
     /// The name on the command line.
@@ -40,6 +43,7 @@ impl SamplerKind {
             Self::Tree => "tree",
             Self::TreeVisible => "tree-visible",
             Self::Table => "table",
+            Self::Adaptive => "adaptive",
         }
     }
 }

@@ -205,6 +205,7 @@ pub(crate) fn observe<S: LightSampler>(
                 point,
                 light: choice.light,
                 unshadowed,
+                irradiance: unshadowed,
                 pmf: choice.pmf,
                 visible: visible(choice.light),
             });

@@ -56,6 +56,12 @@ impl TreeVisibleSampler {
         }
     }
 
+    /// The tree, weighed by what has been learned.
+    #[inline]
+    pub(crate) fn tree(&self) -> &Tree {
+        &self.tree
+    }
+
     /// Learns from a frame; see [`LightSampler::end_frame`].
     pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
         let start = Instant::now();

@@ -52,6 +52,9 @@ pub(crate) trait DirectLight: Sync + Send {
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
 
+    /// Tells where the eye is.
+    fn set_eye(&mut self, eye_ws: Vec3);
+
     /// Learns from a frame.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
 
@@ -101,6 +104,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
                 point: vertex.point,
                 light: choice.light,
                 unshadowed: connection.as_ref().map_or(0.0, Connection::unshadowed),
+                irradiance: connection.as_ref().map_or(0.0, |c| c.irradiance),
                 pmf: choice.pmf,
                 visible,
             });
@@ -117,6 +121,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
     #[inline]
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32 {
         self.0.pmf(local, light)
+    }
+
+    fn set_eye(&mut self, eye_ws: Vec3) {
+        self.0.set_eye(eye_ws);
     }
 
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
@@ -140,6 +148,8 @@ pub(crate) struct Connection {
     weight: f32,
     /// The weight if the light had been chosen for certain: what is learned must not depend on what was learned.
     weight_if_certain: f32,
+    /// Luminance of cosine x radiance / pdf of the point on the light.
+    irradiance: f32,
     shadow_ray: Ray,
     to: PrimitiveId,
 }
@@ -173,6 +183,8 @@ impl Connection {
             unweighted,
             weight,
             weight_if_certain,
+            irradiance: luminance(point.radiance) * surface.bsdf.normal_ws.dot(point.wi_ws).max(0.0)
+                / point.pdf_solid_angle,
             shadow_ray: scene.ray_from(surface, point.wi_ws, point.distance * SHADOW_RAY_END),
             to: record.primitive,
         })

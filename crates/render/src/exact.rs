@@ -148,6 +148,8 @@ impl DirectLight for AllLights {
         1.0
     }
 
+    fn set_eye(&mut self, _eye_ws: Vec3) {}
+
     fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
 
     fn sampler_stats(&self) -> Option<SamplerStats> {

@@ -125,7 +125,8 @@ struct Rendering<'s, D> {
 
 impl<'s, D: DirectLight> Rendering<'s, D> {
     /// `start` is when building the light structures began.
-    fn new(scene: &'s Scene, camera: &Camera, settings: &Settings, direct: D, start: Instant) -> Self {
+    fn new(scene: &'s Scene, camera: &Camera, settings: &Settings, mut direct: D, start: Instant) -> Self {
+        direct.set_eye(camera.world_from_camera.translation.into());
         let film = Film::new(settings.width, settings.height, settings.aovs);
         Self {
             scene,

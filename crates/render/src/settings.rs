@@ -91,7 +91,7 @@ impl Default for Settings {
         Self {
             width: 1280,
             height: 720,
-            method: Method::Sampled(SamplerKind::TreeVisible),
+            method: Method::Sampled(SamplerKind::Adaptive),
             max_bounces: 0,
             seed: 0,
             pixel_filter: PixelFilter::Box,

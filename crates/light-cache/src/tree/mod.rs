@@ -132,6 +132,14 @@ impl Tree {
         }
     }
 
+    /// Luminance of the irradiance that importance 1 stands for.
+    pub(crate) fn unit(lights: &[Light]) -> f32 {
+        lights
+            .iter()
+            .map(bounds::strength)
+            .fold(f64::from(f32::MIN_POSITIVE), f64::max) as f32
+    }
+
     /// Number of lights.
     pub(crate) fn len(&self) -> usize {
         self.rank.len()

@@ -39,6 +39,17 @@ impl<'t> Descent<'t> {
         descent
     }
 
+    /// The same for draws inside one cluster only ([`Descent::draw_in`]): nothing is worked out beforehand.
+    #[inline]
+    pub(crate) fn inside(tree: &'t Tree, receiver: Receiver) -> Self {
+        Self {
+            tree,
+            receiver,
+            near: 0.0,
+            far: 0.0,
+        }
+    }
+
     /// Whether any light can contribute here; if not, nothing may be drawn.
     #[inline]
     pub(crate) fn alive(&self) -> bool {
@@ -48,13 +59,33 @@ impl<'t> Descent<'t> {
     /// Draws a light (its place in tree order) by the position `x` in an interval of `width`; returns with it the
     /// width that is the light's own.
     #[inline]
-    pub(crate) fn draw(&self, mut x: u64, mut width: u64) -> (u32, u64) {
+    pub(crate) fn draw(&self, x: u64, width: u64) -> (u32, u64) {
         let near = split(width, self.near, self.far);
-        if x >= near {
-            return self.draw_distant(x - near, width - near);
+        if x < near {
+            self.draw_in(Some(0), x, near)
+        } else {
+            self.draw_in(None, x - near, width - near)
         }
-        width = near;
-        let mut node = &self.tree.nodes[0];
+    }
+
+    /// The width that the light at `place` owns of an interval of `width`.
+    #[inline]
+    pub(crate) fn width_of(&self, place: u32, width: u64) -> u64 {
+        let near = split(width, self.near, self.far);
+        if (place as usize) < self.tree.leaves.len() {
+            self.width_in(Some(0), place, near)
+        } else {
+            self.width_in(None, place, width - near)
+        }
+    }
+
+    /// Like [`Descent::draw`] among the lights of one node; without a node, among the lights at infinity.
+    #[inline]
+    pub(crate) fn draw_in(&self, node: Option<u32>, mut x: u64, mut width: u64) -> (u32, u64) {
+        let Some(node) = node else {
+            return self.draw_distant(x, width);
+        };
+        let mut node = &self.tree.nodes[node as usize];
         while node.child != LEAF {
             let [first, second] = self.children(node);
             let left = split(width, self.receiver.group(first), self.receiver.group(second));
@@ -80,15 +111,13 @@ impl<'t> Descent<'t> {
         (node.first + slot as u32, width)
     }
 
-    /// The width that the light at `place` owns of an interval of `width`.
+    /// Like [`Descent::width_of`] among the lights of one node; without a node, among the lights at infinity.
     #[inline]
-    pub(crate) fn width_of(&self, place: u32, mut width: u64) -> u64 {
-        let near = split(width, self.near, self.far);
-        if place as usize >= self.tree.leaves.len() {
-            return self.width_of_distant(place as usize - self.tree.leaves.len(), width - near);
-        }
-        width = near;
-        let mut node = &self.tree.nodes[0];
+    pub(crate) fn width_in(&self, node: Option<u32>, place: u32, mut width: u64) -> u64 {
+        let Some(node) = node else {
+            return self.width_of_distant(place as usize - self.tree.leaves.len(), width);
+        };
+        let mut node = &self.tree.nodes[node as usize];
         while node.child != LEAF {
             let [first, second] = self.children(node);
             let left = split(width, self.receiver.group(first), self.receiver.group(second));
@@ -101,9 +130,7 @@ impl<'t> Descent<'t> {
                 return 0;
             }
         }
-        let weights = self.leaf(node);
-        let slot = (place - node.first) as usize;
-        self.width_of_slot(&weights, slot, width)
+        self.width_of_slot(&self.leaf(node), (place - node.first) as usize, width)
     }
 
     /// Adds to `sum`, which is in scene order, the probability of every light: its part of an interval of `width`, and the width `floor` that each has.

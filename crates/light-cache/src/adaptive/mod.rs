@@ -1,0 +1,395 @@
+//! Learned cuts: the sampler that knows which lights matter where.
+//!
+//! World-space cells, hashed, each with a cut of the light tree of its own, whose entries carry the learned root second moment of
+//! their contribution, visibility included. A light is drawn in two steps: an entry by the cell's integer distribution,
+//! then, where the entry is a cluster, a light of it by the tree's descent at the point itself. A fixed share of the
+//! random numbers goes to the global importance table, which holds the guaranteed minimum of every light and every light that ever mattered
+//! anywhere in the image.
+//!
+//! Related: Pantaleoni 2019 (Importance sampling of many lights with reinforcement lightcuts learning), Wang et al. 2021 (Learning to cluster for rendering with many
+//! lights), Vevoda et al. 2018 (Bayesian online regression for adaptive direct illumination sampling). Differs: weights are second moments over all points of the cell, the cell's distribution
+//! is not evaluated point by point (a draw costs a binary search), the probability is an exact sum of integer masses,
+//! and random numbers keep their strata because entries stand in tree order.
+
+mod branch;
+mod cell;
+mod grid;
+
+use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
+use crate::{
+    Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
+    TreeVisibleSampler, records,
+};
+use cell::{Cell, FirstMass};
+use glam::Vec3;
+use grid::{Grid, NO_CELL, Place};
+use rayon::prelude::*;
+use scene::Scene;
+use std::time::Instant;
+
+/// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
+const TABLE_SHARE: f64 = 0.03;
+/// Most cells; points beyond are served by the tree.
+const MAX_CELLS: usize = 1 << 17;
+
+/// Learned cuts.
+#[derive(Debug)]
+pub struct AdaptiveSampler {
+    /// The light tree with visibility learned over the whole image: the prior of every cell.
+    prior: TreeVisibleSampler,
+    table: TableSampler,
+    grid: Grid,
+    cells: Vec<Cell>,
+    first_mass: FirstMass,
+    /// Luminance that is 1 in the tree's importance.
+    unit: f32,
+    build_s: f64,
+    learn_s: f64,
+}
+
+/// The sampler as seen from one shading point.
+#[derive(Debug)]
+pub struct Local<'a> {
+    receiver: Receiver,
+    source: Source<'a>,
+    table: <TableSampler as LightSampler>::Local<'a>,
+    salt: u32,
+}
+
+/// What draws the lights that the table does not draw.
+#[derive(Debug)]
+enum Source<'a> {
+    /// What has been learned around the point.
+    Cell(&'a Cell),
+    /// Nothing has been learned there yet: the tree as it is.
+    Tree(Descent<'a>),
+    /// No light can contribute.
+    Nothing,
+}
+
+/// The part of a random number's range that stands for the probability `mass` x 2^-32.
+fn width(mass: u64) -> u64 {
+    mass * PER_U32
+}
+
+impl AdaptiveSampler {
+    #[inline]
+    fn tree(&self) -> &Tree {
+        self.prior.tree()
+    }
+
+    /// Learned cuts over the lights of `scene`, which start as the light tree.
+    pub fn new(scene: &Scene, settings: &Settings) -> Self {
+        let start = Instant::now();
+        let lights = &scene.lights[..];
+        let floor = f64::from(settings.min_probability_mass);
+        let share = TABLE_SHARE.max(floor).min(0.9);
+        // The table holds the guaranteed mass of all: within its share of the samples it must be that much larger.
+        let within_table = Settings {
+            min_probability_mass: (floor / share) as f32,
+            ..settings.clone()
+        };
+        Self {
+            prior: TreeVisibleSampler::new(lights, settings),
+            table: TableSampler::new(lights, scene.radius, &within_table),
+            grid: Grid::new(scene.center_ws, scene.radius),
+            cells: Vec::new(),
+            first_mass: (share * 4_294_967_296.0) as u32,
+            unit: Tree::unit(lights),
+            build_s: start.elapsed().as_secs_f64(),
+            learn_s: 0.0,
+        }
+    }
+
+    /// The cell of each observation, new cells made where they are missing. Runs through the logs in order, so cells
+    /// are numbered alike on any number of threads.
+    fn assign(&mut self, logs: &[Vec<Observation>]) -> Vec<u32> {
+        let known = self.cells.len();
+        let mut seeds: Vec<Seed> = Vec::new();
+        let grid = &self.grid;
+        let places: Vec<Vec<Place>> = logs
+            .par_iter()
+            .map(|log| log.iter().map(|o| grid.locate(&o.point)).collect())
+            .collect();
+        let assigned = logs
+            .iter()
+            .flatten()
+            .zip(places.iter().flatten())
+            .map(|(o, place)| {
+                let mut cell = place.cell;
+                if let Some(key) = place.missing {
+                    // An observation before may have asked for the same cell.
+                    let made = self.grid.find(key);
+                    if made != NO_CELL {
+                        cell = made;
+                    } else if known + seeds.len() < MAX_CELLS {
+                        let parent = place.cell;
+                        cell = (known + seeds.len()) as u32;
+                        self.grid.insert(key, cell);
+                        seeds.push(Seed {
+                            key,
+                            parent,
+                            points: Vec::new(),
+                        });
+                    }
+                }
+                if let Some(seed) = (cell as usize).checked_sub(known).and_then(|new| seeds.get_mut(new)) {
+                    seed.points.push(Receiver::from(&o.point));
+                }
+                cell
+            })
+            .collect();
+        let (tree, cells, first_mass) = (self.prior.tree(), &self.cells, self.first_mass);
+        let new = seeds.par_iter().map(|seed| match cells.get(seed.parent as usize) {
+            Some(parent) => Cell::half(seed.key, parent, &seed.points, tree, first_mass),
+            None => Cell::new(seed.key, &seed.points, tree, first_mass),
+        });
+        let new: Vec<Cell> = new.collect();
+        self.cells.extend(new);
+        assigned
+    }
+
+    /// Every cell learns from its own observations, in the order in which they were made.
+    fn learn(&mut self, logs: &[Vec<Observation>]) {
+        let assigned = self.assign(logs);
+        let mut ends = vec![0u32; self.cells.len() + 1];
+        for &cell in assigned.iter().filter(|&&cell| cell != NO_CELL) {
+            ends[cell as usize + 1] += 1;
+        }
+        for i in 1..ends.len() {
+            ends[i] += ends[i - 1];
+        }
+        let starts = ends.clone();
+        let mut by_cell: Vec<Option<&Observation>> = vec![None; assigned.len()];
+        for (o, &cell) in logs
+            .iter()
+            .flatten()
+            .zip(&assigned)
+            .filter(|&(_, &cell)| cell != NO_CELL)
+        {
+            let next = &mut ends[cell as usize];
+            by_cell[*next as usize] = Some(o);
+            *next += 1;
+        }
+        let (tree, unit, first_mass) = (self.prior.tree(), self.unit, self.first_mass);
+        let by_cell = &by_cell;
+        self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
+            let range = starts[i] as usize..starts[i + 1] as usize;
+            if !range.is_empty() {
+                cell.learn(tree, unit, by_cell[range].iter().flatten().copied(), first_mass);
+            }
+        });
+        for cell in self.cells.iter_mut().filter(|cell| cell.wants_halves()) {
+            cell.split = true;
+            self.grid.split(cell.key);
+        }
+    }
+}
+
+/// A cell about to be made.
+struct Seed {
+    key: u64,
+    /// The cell it is a half of, or [`NO_CELL`].
+    parent: u32,
+    /// The points of its first observations.
+    points: Vec<Receiver>,
+}
+
+impl LightSampler for AdaptiveSampler {
+    type Local<'a> = Local<'a>;
+    const LEARNS: bool = true;
+
+    fn set_eye(&mut self, eye_ws: Vec3) {
+        self.grid.set_eye(eye_ws);
+    }
+
+    #[inline]
+    fn local(&self, scene: &Scene, point: &ShadingPoint) -> Local<'_> {
+        let source = match self.cells.get(self.grid.locate(point).cell as usize) {
+            Some(cell) => Source::Cell(cell),
+            None => {
+                let descent = Descent::new(self.tree(), point.into());
+                if descent.alive() {
+                    Source::Tree(descent)
+                } else {
+                    Source::Nothing
+                }
+            }
+        };
+        Local {
+            receiver: point.into(),
+            source,
+            table: self.table.local(scene, point),
+            salt: point.salt(),
+        }
+    }
+
+    #[inline]
+    fn sample(&self, local: &Local<'_>, u: u32) -> Option<Choice> {
+        let x = position(u, local.salt);
+        let table_width = width(self.first_mass.into());
+        let (place, own) = match &local.source {
+            Source::Nothing => return None,
+            _ if x < table_width => {
+                let stretched = (u128::from(x) << 32) / u128::from(table_width);
+                let light = self.table.sample(&local.table, stretched as u32)?.light;
+                return Some(Choice {
+                    light,
+                    pmf: self.pmf(local, light),
+                });
+            }
+            Source::Tree(descent) => descent.draw(x - table_width, UNIT - table_width),
+            Source::Cell(cell) => {
+                let j = cell.draw(u);
+                let (first, mass) = cell.range(j, self.first_mass);
+                let branch = cell.entries[j].branch;
+                match branch.light() {
+                    Some(place) => (place, width(mass)),
+                    None => self
+                        .inside(local)
+                        .draw_in(branch.node(), x - width(first.into()), width(mass)),
+                }
+            }
+        };
+        let light = self.tree().light_at(place);
+        Some(Choice {
+            light,
+            pmf: probability(own) + self.table_pmf(local, light),
+        })
+    }
+
+    #[inline]
+    fn pmf(&self, local: &Local<'_>, light: u32) -> f32 {
+        let place = self.tree().rank[light as usize];
+        let own = match &local.source {
+            Source::Nothing => return 0.0,
+            Source::Tree(descent) => descent.width_of(place, UNIT - width(self.first_mass.into())),
+            Source::Cell(cell) => {
+                let j = cell.entry_of(place);
+                let (_, mass) = cell.range(j, self.first_mass);
+                let branch = cell.entries[j].branch;
+                match branch.light() {
+                    Some(_) => width(mass),
+                    None => self.inside(local).width_in(branch.node(), place, width(mass)),
+                }
+            }
+        };
+        probability(own) + self.table_pmf(local, light)
+    }
+
+    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
+        let start = Instant::now();
+        self.table.end_frame(scene, logs);
+        self.learn(logs);
+        self.prior.end_frame(scene, logs);
+        self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    fn stats(&self) -> SamplerStats {
+        let table = self.table.stats();
+        SamplerStats {
+            bytes: self.tree().bytes()
+                + table.bytes
+                + self.grid.bytes()
+                + self.cells.iter().map(Cell::bytes).sum::<usize>(),
+            cells: self.cells.len(),
+            min_probability: table.min_probability * f64::from(self.first_mass) / 4_294_967_296.0,
+            build_s: self.build_s,
+            learn_s: self.learn_s,
+            skipped: Vec::new(),
+            biased: table.biased,
+        }
+    }
+
+    fn records(&self, scene: &Scene) -> Vec<LightRecord> {
+        records::of_sampler(self, scene, &[])
+    }
+}
+
+impl AdaptiveSampler {
+    /// For the inside of a cluster.
+    #[inline]
+    fn inside(&self, local: &Local<'_>) -> Descent<'_> {
+        Descent::inside(self.tree(), local.receiver)
+    }
+
+    #[inline]
+    fn table_pmf(&self, local: &Local<'_>, light: u32) -> f32 {
+        self.table.pmf(&local.table, light) * (self.first_mass as f32 / 4_294_967_296.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+
+    fn learned(scene: &Scene, frames: u32, visible: impl Fn(u32) -> bool) -> AdaptiveSampler {
+        let mut sampler = AdaptiveSampler::new(scene, &Settings::default());
+        for frame in 0..frames {
+            let logs = observe(&sampler, scene, frame, &visible);
+            sampler.end_frame(scene, &logs);
+        }
+        sampler
+    }
+
+    #[test]
+    fn keeps_the_promises_of_a_sampler() {
+        for count in [1, 2, 5, 300] {
+            let scene = scene_of(mixed_lights(count, 3));
+            for frames in [0, 1, 6] {
+                let sampler = learned(&scene, frames, |light| light.is_multiple_of(3));
+                check(&sampler, &scene, &points(16, 5));
+            }
+            check_each_light_is_drawn(&learned(&scene, 4, |light| light.is_multiple_of(3)), &scene);
+        }
+    }
+
+    #[test]
+    fn every_light_keeps_the_guaranteed_minimum() {
+        let scene = scene_of(mixed_lights(200, 3));
+        let sampler = learned(&scene, 8, |light| light == 7);
+        let least = sampler.stats().min_probability;
+        assert!(least >= 0.9 * f64::from(Settings::default().min_probability_mass) / 200.0);
+        for point in points(32, 9) {
+            let local = sampler.local(&scene, &point);
+            for light in 0..200 {
+                assert!(f64::from(sampler.pmf(&local, light)) >= 0.999 * least, "{light}");
+            }
+        }
+    }
+
+    #[test]
+    fn hidden_lights_lose_their_samples() {
+        let scene = scene_of(mixed_lights(200, 3));
+        let visible = |light: u32| light % 10 == 4;
+        let share = |sampler: &AdaptiveSampler| {
+            let records = sampler.records(&scene);
+            (0..)
+                .zip(records)
+                .filter(|(light, _)| visible(*light))
+                .map(|(_, r)| r.probability)
+                .sum::<f64>()
+        };
+        let before = share(&learned(&scene, 0, visible));
+        let after = share(&learned(&scene, 16, visible));
+        assert!(before < 0.15 && after > 0.5, "{before} {after}");
+    }
+
+    #[test]
+    fn learning_does_not_depend_on_the_number_of_threads() {
+        let scene = scene_of(mixed_lights(300, 3));
+        let pmfs = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads start");
+            pool.install(|| {
+                let sampler = learned(&scene, 5, |light| light % 3 == 1);
+                let of = |p: &ShadingPoint| (0..300).map(|l| sampler.pmf(&sampler.local(&scene, p), l)).collect();
+                points(16, 5).iter().map(of).collect::<Vec<Vec<f32>>>()
+            })
+        };
+        assert_eq!(pmfs(1), pmfs(3));
+    }
+}
