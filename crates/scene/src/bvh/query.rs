@@ -80,26 +80,25 @@ impl<'a> Query<'a> {
     /// [`Bvh::occluded`] by the geometry that is placed once.
     #[inline(always)]
     pub(super) unsafe fn occluded_fixed<I: Instructions>(&self) -> bool {
-        self.bvh.fixed.is_some_and(|root| {
-            let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
-            // SAFETY: as the caller promises.
-            unsafe { self.occluded_in::<I>(root, 0, &local) }
-        })
+        // Not a closure given to `Option`: only what is inlined is compiled for the instruction set.
+        let Some(root) = self.bvh.fixed else { return false };
+        let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
+        // SAFETY: as the caller promises.
+        unsafe { self.occluded_in::<I>(root, 0, &local) }
     }
 
     /// [`Bvh::occluded`] by instanced geometry.
     #[inline(always)]
     pub(super) unsafe fn occluded_placed<I: Instructions>(&self) -> bool {
-        self.bvh.top.is_some_and(|root| {
-            let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
-            let mut visitor = AnyPlaced {
-                query: self,
-                found: false,
-            };
-            // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<I, false>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visitor) };
-            visitor.found
-        })
+        let Some(root) = self.bvh.top else { return false };
+        let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
+        let mut visitor = AnyPlaced {
+            query: self,
+            found: false,
+        };
+        // SAFETY: as the caller promises; `top` was made by `collapse`.
+        unsafe { walk::<I, false>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visitor) };
+        visitor.found
     }
 
     #[inline(always)]
