@@ -79,7 +79,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         self.0.local(scene, point)
     }
 
-    #[inline]
+    #[inline(always)]
     fn estimate(
         &self,
         scene: &Scene,
@@ -156,7 +156,7 @@ pub(crate) struct Connection {
 
 impl Connection {
     /// Joins `vertex` with the point `u` on `light`, chosen with probability `pmf`; `None` if no light can arrive.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn new(scene: &Scene, vertex: &Vertex<'_>, light: u32, pmf: f32, u: Vec2) -> Option<Self> {
         let surface = vertex.surface;
         let point = scene.sample_light(light, surface.position_ws, u)?;
@@ -204,7 +204,7 @@ impl Connection {
     }
 
     /// Traces the shadow ray.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn is_visible(
         &self,
         scene: &Scene,

@@ -1,7 +1,7 @@
 //! The frame, from the tile down to the last bounce of a path: read it from top to bottom.
 
 use crate::direct::{DirectLight, Vertex};
-use crate::film::{AovSample, Tile};
+use crate::film::{AovSample, TILE_SIZE, Tile};
 use crate::filter::FilterSampler;
 use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
@@ -91,41 +91,60 @@ pub(crate) fn render_tile<D: DirectLight, const AOVS: bool>(
     tile: &mut Tile,
     log: &mut TileLog<'_>,
 ) {
-    let mut index = 0;
-    for y in tile.y0..tile.y0 + tile.height {
-        for x in tile.x0..tile.x0 + tile.width {
-            let sequence = PixelSequence::new(view.seed, y * view.image_width + x, view.frame);
-            let pixel = Vec2::new(x as f32, y as f32);
+    for row in 0..tile.height {
+        // The eye rays of a row first: one after the other they keep the processor busier than between long paths.
+        let starts: [Start; TILE_SIZE as usize] =
+            std::array::from_fn(|column| Start::new(view, tile.x0 + column as u32, tile.y0 + row));
+        for (column, start) in starts[..tile.width as usize].iter().enumerate() {
+            let index = row as usize * tile.width as usize + column;
             let radiance = if AOVS {
                 let mut aovs = AovSample::NONE;
-                let radiance = path(view, pixel, &sequence, log, &mut aovs);
+                let radiance = path(view, start, log, &mut aovs);
                 tile.add_aovs(index, &aovs);
                 radiance
             } else {
-                path(view, pixel, &sequence, log, &mut ())
+                path(view, start, log, &mut ())
             };
             if !tile.add(index, radiance) {
                 log.counters.nonfinite += 1;
             }
-            index += 1;
         }
     }
 }
 
-/// The radiance that one path through the pixel (its top left corner is given) brings back.
-#[inline]
+/// Where a path begins.
+pub(crate) struct Start {
+    sequence: PixelSequence,
+    direction_ws: Vec3,
+}
+
+impl Start {
+    /// In the pixel of column `x` and row `y`.
+    #[inline(always)]
+    pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
+        let sequence = PixelSequence::new(view.seed, y * view.image_width + x, view.frame);
+        let pixel = Vec2::new(x as f32, y as f32);
+        let offset = view.filter.offset(sequence.vertex(0).vec2(0));
+        Self {
+            sequence,
+            direction_ws: view.camera.direction_ws(pixel + offset),
+        }
+    }
+}
+
+/// The radiance that one path brings back.
+#[inline(always)]
 pub(crate) fn path<D: DirectLight>(
     view: &FrameView<'_, D>,
-    pixel: Vec2,
-    sequence: &PixelSequence,
+    start: &Start,
     log: &mut TileLog<'_>,
     probe: &mut impl Probe,
 ) -> Vec3 {
     let scene = view.scene;
-    let mut numbers = sequence.vertex(0);
+    let mut numbers = start.sequence.vertex(0);
     let mut ray = Ray {
         origin_ws: view.camera.origin_ws,
-        direction_ws: view.camera.direction_ws(pixel + view.filter.offset(numbers.vec2(0))),
+        direction_ws: start.direction_ws,
         t_max: f32::INFINITY,
     };
     let mut left: Option<Departure<D::Local<'_>>> = None;
@@ -204,7 +223,7 @@ pub(crate) fn path<D: DirectLight>(
             pdf_solid_angle: sample.pdf_solid_angle,
         });
         bounce += 1;
-        numbers = sequence.vertex(bounce);
+        numbers = start.sequence.vertex(bounce);
     }
     radiance
 }

@@ -3,10 +3,8 @@
 use crate::Settings;
 use crate::direct::OneLight;
 use crate::filter::FilterSampler;
-use crate::path::{Counters, FrameView, Probe, TileLog, path};
-use glam::Vec2;
+use crate::path::{Counters, FrameView, Probe, Start, TileLog, path};
 use light_cache::UniformSampler;
-use sampling::PixelSequence;
 use scene::{Camera, PrimitiveId, Ray, Scene};
 
 /// Rays in the order in which a rendering traces them.
@@ -50,8 +48,7 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
     for tile in film.tiles_mut() {
         for y in tile.y0..tile.y0 + tile.height {
             for x in tile.x0..tile.x0 + tile.width {
-                let sequence = PixelSequence::new(settings.seed, y * settings.width + x, frame);
-                path(&view, Vec2::new(x as f32, y as f32), &sequence, &mut log, &mut rays);
+                path(&view, &Start::new(&view, x, y), &mut log, &mut rays);
             }
         }
     }

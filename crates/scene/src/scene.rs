@@ -184,26 +184,28 @@ impl Scene {
     }
 
     /// The light at `index` as a triangle's hit sees it, texture included: [`Light::sample`] with the exact texel.
-    #[inline]
+    #[inline(always)]
     pub fn sample_light(&self, index: u32, from_ws: Vec3, u: Vec2) -> Option<LightPoint> {
         let light = &self.lights[index as usize];
-        let point = light.sample(from_ws, u)?;
+        let mut point = light.sample(from_ws, u)?;
         if light.textured {
-            self.with_texel(light, from_ws, point)
-        } else {
-            Some(point)
+            point.radiance = self.texel(light, from_ws, point.wi_ws, point.distance);
+            if point.radiance == Vec3::ZERO {
+                return None;
+            }
         }
+        Some(point)
     }
 
+    /// Radiance of a textured light in a direction.
     #[cold]
     #[inline(never)]
-    fn with_texel(&self, light: &Light, from_ws: Vec3, point: LightPoint) -> Option<LightPoint> {
+    fn texel(&self, light: &Light, from_ws: Vec3, wi_ws: Vec3, distance: f32) -> Vec3 {
         let PrimitiveId { instance, triangle } = light.primitive;
         let mesh = &self.parts.meshes[self.parts.instances[instance as usize].mesh as usize];
         let material = &self.parts.materials[mesh.materials[triangle as usize] as usize];
-        let at = light.barycentrics(from_ws, point.wi_ws, point.distance);
-        let radiance = Inputs::at(mesh, triangle as usize, at.x, at.y).emission(&self.parts.textures, material);
-        (radiance != Vec3::ZERO).then_some(LightPoint { radiance, ..point })
+        let at = light.barycentrics(from_ws, wi_ws, distance);
+        Inputs::at(mesh, triangle as usize, at.x, at.y).emission(&self.parts.textures, material)
     }
 
     /// Where light `index` comes from.

@@ -74,7 +74,10 @@ impl Scene {
         if triangle.plain() {
             surface
         } else {
-            self.refine(surface, triangle, ray, hit)
+            // A copy: only what `refine` is given must lie in memory, and the rest stays in registers.
+            let mut refined = surface;
+            self.refine(&mut refined, triangle, ray, hit);
+            refined
         }
     }
 
@@ -92,7 +95,7 @@ impl Scene {
     /// Interpolated normals, textures and vertex colours.
     #[cold]
     #[inline(never)]
-    fn refine(&self, mut surface: Surface, triangle: &TriangleRecord, ray: &Ray, hit: &Hit) -> Surface {
+    fn refine(&self, surface: &mut Surface, triangle: &TriangleRecord, ray: &Ray, hit: &Hit) {
         let instance = &self.parts.instances[hit.id.instance as usize];
         let mesh = &self.parts.meshes[instance.mesh as usize];
         let material = &self.parts.materials[triangle.material() as usize];
@@ -126,7 +129,6 @@ impl Scene {
             instance.world_normal_from_local * normal
         };
         surface.bsdf.normal_ws = usable_normal(normal_ws, surface.geometric_normal_ws, -ray.direction_ws);
-        surface
     }
 
     /// A ray that leaves `surface` towards `wi_ws`, its origin moved off the surface on the side of `wi_ws`.

@@ -104,7 +104,7 @@ impl Light {
     /// emitter, outside cone or range, degenerate). Triangles are drawn by solid angle where that pays, by area
     /// elsewhere; [`Light::pdf_solid_angle`] decides alike. Texture is not applied here (see
     /// [`crate::Scene::sample_light`]).
-    #[inline]
+    #[inline(always)]
     pub fn sample(&self, from_ws: Vec3, u: Vec2) -> Option<LightPoint> {
         match self.kind {
             LightKind::Triangle => self.sample_triangle(from_ws, u),

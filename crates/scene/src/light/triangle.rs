@@ -56,7 +56,7 @@ impl Light {
         SphericalTriangle::new(to_first, to_first + self.edge1_ws, to_first + self.edge2_ws)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn sample_triangle(&self, from_ws: Vec3, u: Vec2) -> Option<LightPoint> {
         let to_first = self.position_ws - from_ws;
         let height = -self.normal_ws.dot(to_first);
