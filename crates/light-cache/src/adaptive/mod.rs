@@ -29,6 +29,11 @@ use std::time::Instant;
 
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
 const TABLE_SHARE: f64 = 0.03;
+/// Frames after the eye has moved that are all learned from; later every [`LATER_STEP`]th is, for little is new in them.
+/// Higher values learn more; lower values are faster.
+const FIRST_FRAMES: u32 = 24;
+/// See [`FIRST_FRAMES`].
+const LATER_STEP: u32 = 4;
 /// Most cells; points beyond are served by the tree.
 const MAX_CELLS: usize = 1 << 17;
 
@@ -41,6 +46,8 @@ pub struct AdaptiveSampler {
     grid: Grid,
     cells: Vec<Cell>,
     first_mass: FirstMass,
+    /// Frames since the eye has moved.
+    frame: u32,
     /// Luminance that is 1 in the tree's importance.
     unit: f32,
     build_s: f64,
@@ -95,6 +102,7 @@ impl AdaptiveSampler {
             grid: Grid::new(scene.center_ws, scene.radius),
             cells: Vec::new(),
             first_mass: (share * 4_294_967_296.0) as u32,
+            frame: 0,
             unit: Tree::unit(lights),
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
@@ -201,6 +209,7 @@ impl LightSampler for AdaptiveSampler {
 
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.grid.set_eye(eye_ws);
+        self.frame = 0;
     }
 
     #[inline]
@@ -278,6 +287,10 @@ impl LightSampler for AdaptiveSampler {
     }
 
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
+        self.frame = self.frame.saturating_add(1);
+        if self.frame > FIRST_FRAMES && !self.frame.is_multiple_of(LATER_STEP) {
+            return;
+        }
         let start = Instant::now();
         self.table.end_frame(scene, logs);
         self.learn(logs);
