@@ -9,6 +9,8 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
 /// Share of the nodes that reinsertion tries to place better. Higher values build slower and trace faster.
 const REINSERTION_SHARE: f32 = 0.3;
+/// Most nodes that it tries, so that very large scenes are built in seconds.
+const MOST_REINSERTIONS: f32 = 600_000.0;
 
 /// PLOC (Meister and Bittner 2018), then parallel reinsertion (Meister and Bittner 2018). Every leaf holds one box, and
 /// `primitive_indices[first_index]` is its index in `boxes`.
@@ -21,7 +23,8 @@ pub(super) fn build<T: Boundable>(boxes: &[T]) -> Bvh2 {
         SortPrecision::U64,
         3,
     );
-    ReinsertionOptimizer::default().run(&mut tree, REINSERTION_SHARE, None);
+    let share = REINSERTION_SHARE.min(MOST_REINSERTIONS / tree.nodes.len().max(1) as f32);
+    ReinsertionOptimizer::default().run(&mut tree, share, None);
     tree.parents = Vec::new();
     tree
 }
