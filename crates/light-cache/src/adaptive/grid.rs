@@ -65,8 +65,9 @@ impl Grid {
     #[inline]
     fn key(&self, point: &ShadingPoint, level: u32) -> u64 {
         let size = self.min_size * (1u64 << level) as f32;
-        let cell = ((point.position_ws - self.center_ws) / size).floor();
-        let [x, y, z] = [cell.x, cell.y, cell.z].map(|c| u64::from(c as i32 as u32 & 0xf_ffff));
+        let [x, y, z] = ((point.position_ws - self.center_ws) / size)
+            .to_array()
+            .map(|c| u64::from(floor(c) as u32 & 0xf_ffff));
         // 3 x 20 bits of position; level, normal and kind are mixed in. Two cells that clash share a distribution:
         // that costs noise and nothing else.
         let tag = u64::from(mix(level << 8
@@ -148,6 +149,13 @@ pub(super) struct Place {
     pub(super) cell: u32,
     /// Key of the cell that ought to be made here, if one is missing.
     pub(super) missing: Option<u64>,
+}
+
+/// The largest whole number that is not above `x`: the library's floor is a call where the target lacks the instruction.
+#[inline]
+fn floor(x: f32) -> i32 {
+    let truncated = x as i32;
+    truncated - i32::from(truncated as f32 > x)
 }
 
 /// 0..6: the axis, and the side of it, to which the normal is nearest.

@@ -13,6 +13,7 @@
 
 mod branch;
 mod cell;
+mod cells;
 mod grid;
 
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
@@ -21,10 +22,10 @@ use crate::{
     TreeVisibleSampler, records,
 };
 use cell::{Cell, FirstMass};
+use cells::Cells;
 use glam::Vec3;
-use grid::{Grid, NO_CELL, Place};
-use rayon::prelude::*;
 use scene::Scene;
+use std::borrow::Cow;
 use std::time::Instant;
 
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
@@ -34,8 +35,9 @@ const TABLE_SHARE: f64 = 0.03;
 const FIRST_FRAMES: u32 = 24;
 /// See [`FIRST_FRAMES`].
 const LATER_STEP: u32 = 4;
-/// Most cells; points beyond are served by the tree.
-const MAX_CELLS: usize = 1 << 17;
+/// Observations that are learned from in one frame, at most: larger images are thinned, so that learning costs the same
+/// at any size. Higher values learn more; lower values are faster.
+const MAX_OBSERVATIONS: usize = 1 << 16;
 
 /// Learned cuts.
 #[derive(Debug)]
@@ -43,13 +45,10 @@ pub struct AdaptiveSampler {
     /// The light tree with visibility learned over the whole image: the prior of every cell.
     prior: TreeVisibleSampler,
     table: TableSampler,
-    grid: Grid,
-    cells: Vec<Cell>,
+    cells: Cells,
     first_mass: FirstMass,
     /// Frames since the eye has moved.
     frame: u32,
-    /// Luminance that is 1 in the tree's importance.
-    unit: f32,
     build_s: f64,
     learn_s: f64,
 }
@@ -74,6 +73,23 @@ enum Source<'a> {
     Nothing,
 }
 
+/// Every nth observation, so that at most [`MAX_OBSERVATIONS`] or so are left; which ones changes with the frame.
+fn thinned(logs: &[Vec<Observation>], frame: u32) -> Cow<'_, [Vec<Observation>]> {
+    let step = logs
+        .iter()
+        .map(Vec::len)
+        .sum::<usize>()
+        .div_ceil(MAX_OBSERVATIONS)
+        .max(1);
+    if step == 1 {
+        return Cow::Borrowed(logs);
+    }
+    let first = frame as usize % step;
+    logs.iter()
+        .map(|log| log.iter().skip(first).step_by(step).copied().collect())
+        .collect()
+}
+
 /// The part of a random number's range that stands for the probability `mass` x 2^-32.
 fn width(mass: u64) -> u64 {
     mass * PER_U32
@@ -96,111 +112,17 @@ impl AdaptiveSampler {
             min_probability_mass: (floor / share) as f32,
             ..settings.clone()
         };
+        let first_mass = (share * 4_294_967_296.0) as u32;
         Self {
             prior: TreeVisibleSampler::new(lights, settings),
             table: TableSampler::new(lights, scene.radius, &within_table),
-            grid: Grid::new(scene.center_ws, scene.radius),
-            cells: Vec::new(),
-            first_mass: (share * 4_294_967_296.0) as u32,
+            cells: Cells::new(scene.center_ws, scene.radius, first_mass, Tree::unit(lights)),
+            first_mass,
             frame: 0,
-            unit: Tree::unit(lights),
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
         }
     }
-
-    /// The cell of each observation, new cells made where they are missing. Runs through the logs in order, so cells
-    /// are numbered alike on any number of threads.
-    fn assign(&mut self, logs: &[Vec<Observation>]) -> Vec<u32> {
-        let known = self.cells.len();
-        let mut seeds: Vec<Seed> = Vec::new();
-        let grid = &self.grid;
-        let places: Vec<Vec<Place>> = logs
-            .par_iter()
-            .map(|log| log.iter().map(|o| grid.locate(&o.point)).collect())
-            .collect();
-        let assigned = logs
-            .iter()
-            .flatten()
-            .zip(places.iter().flatten())
-            .map(|(o, place)| {
-                let mut cell = place.cell;
-                if let Some(key) = place.missing {
-                    // An observation before may have asked for the same cell.
-                    let made = self.grid.find(key);
-                    if made != NO_CELL {
-                        cell = made;
-                    } else if known + seeds.len() < MAX_CELLS {
-                        let parent = place.cell;
-                        cell = (known + seeds.len()) as u32;
-                        self.grid.insert(key, cell);
-                        seeds.push(Seed {
-                            key,
-                            parent,
-                            points: Vec::new(),
-                        });
-                    }
-                }
-                if let Some(seed) = (cell as usize).checked_sub(known).and_then(|new| seeds.get_mut(new)) {
-                    seed.points.push(Receiver::from(&o.point));
-                }
-                cell
-            })
-            .collect();
-        let (tree, cells, first_mass) = (self.prior.tree(), &self.cells, self.first_mass);
-        let new = seeds.par_iter().map(|seed| match cells.get(seed.parent as usize) {
-            Some(parent) => Cell::half(seed.key, parent, &seed.points, tree, first_mass),
-            None => Cell::new(seed.key, &seed.points, tree, first_mass),
-        });
-        let new: Vec<Cell> = new.collect();
-        self.cells.extend(new);
-        assigned
-    }
-
-    /// Every cell learns from its own observations, in the order in which they were made.
-    fn learn(&mut self, logs: &[Vec<Observation>]) {
-        let assigned = self.assign(logs);
-        let mut ends = vec![0u32; self.cells.len() + 1];
-        for &cell in assigned.iter().filter(|&&cell| cell != NO_CELL) {
-            ends[cell as usize + 1] += 1;
-        }
-        for i in 1..ends.len() {
-            ends[i] += ends[i - 1];
-        }
-        let starts = ends.clone();
-        let mut by_cell: Vec<Option<&Observation>> = vec![None; assigned.len()];
-        for (o, &cell) in logs
-            .iter()
-            .flatten()
-            .zip(&assigned)
-            .filter(|&(_, &cell)| cell != NO_CELL)
-        {
-            let next = &mut ends[cell as usize];
-            by_cell[*next as usize] = Some(o);
-            *next += 1;
-        }
-        let (tree, unit, first_mass) = (self.prior.tree(), self.unit, self.first_mass);
-        let by_cell = &by_cell;
-        self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
-            let range = starts[i] as usize..starts[i + 1] as usize;
-            if !range.is_empty() {
-                cell.learn(tree, unit, by_cell[range].iter().flatten().copied(), first_mass);
-            }
-        });
-        for cell in self.cells.iter_mut().filter(|cell| cell.wants_halves()) {
-            cell.split = true;
-            self.grid.split(cell.key);
-        }
-    }
-}
-
-/// A cell about to be made.
-struct Seed {
-    key: u64,
-    /// The cell it is a half of, or [`NO_CELL`].
-    parent: u32,
-    /// The points of its first observations.
-    points: Vec<Receiver>,
 }
 
 impl LightSampler for AdaptiveSampler {
@@ -208,13 +130,13 @@ impl LightSampler for AdaptiveSampler {
     const LEARNS: bool = true;
 
     fn set_eye(&mut self, eye_ws: Vec3) {
-        self.grid.set_eye(eye_ws);
+        self.cells.set_eye(eye_ws);
         self.frame = 0;
     }
 
     #[inline]
     fn local(&self, scene: &Scene, point: &ShadingPoint) -> Local<'_> {
-        let source = match self.cells.get(self.grid.locate(point).cell as usize) {
+        let source = match self.cells.at(point) {
             Some(cell) => Source::Cell(cell),
             None => {
                 let descent = Descent::new(self.tree(), point.into());
@@ -292,8 +214,9 @@ impl LightSampler for AdaptiveSampler {
             return;
         }
         let start = Instant::now();
-        self.table.end_frame(scene, logs);
-        self.learn(logs);
+        let logs = &*thinned(logs, self.frame);
+        let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
+        rayon::join(|| table.end_frame(scene, logs), || cells.learn(prior.tree(), logs));
         self.prior.end_frame(scene, logs);
         self.learn_s += start.elapsed().as_secs_f64();
     }
@@ -301,10 +224,7 @@ impl LightSampler for AdaptiveSampler {
     fn stats(&self) -> SamplerStats {
         let table = self.table.stats();
         SamplerStats {
-            bytes: self.tree().bytes()
-                + table.bytes
-                + self.grid.bytes()
-                + self.cells.iter().map(Cell::bytes).sum::<usize>(),
+            bytes: self.tree().bytes() + table.bytes + self.cells.bytes(),
             cells: self.cells.len(),
             min_probability: table.min_probability * f64::from(self.first_mass) / 4_294_967_296.0,
             build_s: self.build_s,
