@@ -123,10 +123,12 @@ fn learn<S: LightSampler>(sampler: &mut S, scene: &Scene, points: &[ShadingPoint
                 t_max: light.distance * 0.999,
             };
             let to = scene.lights[choice.light as usize].primitive;
+            let irradiance = scene::luminance(light.radiance) * cosine / light.pdf_solid_angle;
             Some(Observation {
                 point: *point,
                 light: choice.light,
-                unshadowed: scene::luminance(light.radiance) * cosine / light.pdf_solid_angle,
+                unshadowed: irradiance,
+                irradiance,
                 pmf: choice.pmf,
                 visible: !scene.occluded(&ray, PrimitiveId::NONE, to),
             })

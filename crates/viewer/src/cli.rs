@@ -33,6 +33,9 @@ pub(crate) struct Cli {
     /// No progress and no summary; warnings and errors only
     #[arg(short, long, global = true)]
     pub(crate) quiet: bool,
+    /// Also tell what the scene does not need and is skipped (`info` and --stats always tell)
+    #[arg(short, long, global = true, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
 }
 
 /// The commands.
@@ -177,6 +180,11 @@ impl From<Filter> for PixelFilter {
     }
 }
 
+/// The name of the sampler that is used where none is asked for.
+pub(crate) fn default_method() -> &'static str {
+    render::Settings::default().method.name()
+}
+
 /// What a method does, in a few words.
 pub(crate) fn describe(method: Method) -> &'static str {
     match method {
@@ -188,6 +196,7 @@ pub(crate) fn describe(method: Method) -> &'static str {
             SamplerKind::Tree => "light tree with bounding cones, visibility unknown",
             SamplerKind::TreeVisible => "light tree, leaf flux times learned visibility",
             SamplerKind::Table => "global running-maximum importance table",
+            SamplerKind::Adaptive => "learned cuts: cells that know which lights matter where",
         },
     }
 }

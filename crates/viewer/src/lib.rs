@@ -2,6 +2,11 @@
 //!
 //! Results go to stdout, progress and messages to stderr. Absent from this crate: light transport.
 
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "doc comments of arguments are their help text, brackets and all"
+)]
+
 mod cli;
 mod cmd;
 mod exit;
@@ -27,7 +32,7 @@ pub fn run() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => return usage(&error),
     };
-    message::set_quiet(cli.quiet);
+    message::set_level(cli.quiet, cli.verbose);
     let outcome = interrupt::install().and_then(|()| match &cli.command {
         Command::Render(args) => cmd::render::run(args),
         Command::Bench(args) => cmd::bench::run(args),

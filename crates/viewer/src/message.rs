@@ -5,10 +5,12 @@ use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 static QUIET: AtomicBool = AtomicBool::new(false);
+static VERBOSE: AtomicBool = AtomicBool::new(false);
 
-/// Silences progress and notes; warnings and errors stay.
-pub(crate) fn set_quiet(quiet: bool) {
+/// Quiet silences progress and notes, warnings and errors stay; verbose adds details.
+pub(crate) fn set_level(quiet: bool, verbose: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
+    VERBOSE.store(verbose, Ordering::Relaxed);
 }
 
 /// Whether progress and notes are silenced.
@@ -20,6 +22,13 @@ pub(crate) fn quiet() -> bool {
 pub(crate) fn note(text: impl Display) {
     if !quiet() {
         let _ = writeln!(std::io::stderr(), "{text}");
+    }
+}
+
+/// Something for those who ask for it.
+pub(crate) fn detail(text: impl Display) {
+    if VERBOSE.load(Ordering::Relaxed) {
+        note(text);
     }
 }
 

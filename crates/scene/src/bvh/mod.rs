@@ -1,7 +1,7 @@
 //! Ray queries: the nearest hit, and whether anything stands between two points.
 //!
-//! A binary tree ([`bvh2`], built by the `obvhs` crate) is collapsed into nodes of eight quantised boxes ([`node`]) and
-//! leaves of up to eight triangles ([`pack`]), so that a vector instruction tests all of one ([`kernel`]). Each mesh has
+//! A binary tree (`bvh2`, built by the `obvhs` crate) is collapsed into nodes of eight quantised boxes (`node`) and
+//! leaves of up to eight triangles (`pack`), so that a vector instruction tests all of one (`kernel`). Each mesh has
 //! one tree in its own space. Mesh 0 lies in world space and is walked first; instances of other meshes, if there are
 //! any, are found through one more tree over their boxes.
 

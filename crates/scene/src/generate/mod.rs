@@ -24,6 +24,7 @@ use std::ops::RangeInclusive;
 /// A family of generated scenes.
 struct Family {
     name: &'static str,
+    shows: &'static str,
     lights: RangeInclusive<usize>,
     default: usize,
     make: fn(usize, u32) -> SceneParts,
@@ -34,42 +35,49 @@ const MANY: RangeInclusive<usize> = 16..=1_000_000;
 const FAMILIES: &[Family] = &[
     Family {
         name: "rooms",
+        shows: "a building of many rooms with ceiling lamps and furniture; most lights are hidden",
         lights: MANY,
         default: 2048,
         make: |lights, seed| rooms::rooms("rooms", lights, seed, Source::Panels),
     },
     Family {
         name: "points",
+        shows: "the same building, lit by point lights",
         lights: MANY,
         default: 2048,
         make: |lights, seed| rooms::rooms("points", lights, seed, Source::Points),
     },
     Family {
         name: "plaza",
+        shows: "a night market: thousands of small lights over three decades of power",
         lights: MANY,
         default: 4096,
         make: plaza::plaza,
     },
     Family {
         name: "sun-outside",
+        shows: "rooms, and one light a thousand times stronger that never reaches the image",
         lights: MANY,
         default: 2048,
         make: rooms::sun_outside,
     },
     Family {
         name: "keyhole",
+        shows: "a room lit only through a narrow gap",
         lights: MANY,
         default: 1024,
         make: keyhole::keyhole,
     },
     Family {
         name: "spheres",
+        shows: "glossy materials under many lights",
         lights: MANY,
         default: 1024,
         make: spheres::spheres,
     },
     Family {
         name: "one-light",
+        shows: "a single light, for checks",
         lights: 1..=1,
         default: 1,
         make: |_, seed| one_light::one_light(seed),
@@ -79,6 +87,11 @@ const FAMILIES: &[Family] = &[
 /// The names of the generated scenes, in the order in which they are worth looking at.
 pub fn names() -> impl Iterator<Item = &'static str> {
     FAMILIES.iter().map(|family| family.name)
+}
+
+/// The names of the generated scenes, each with a line that tells what it shows.
+pub fn families() -> impl Iterator<Item = (&'static str, &'static str)> {
+    FAMILIES.iter().map(|family| (family.name, family.shows))
 }
 
 /// Makes the scene named by `what` = `NAME[:LIGHTS[:SEED]]`. It has exactly LIGHTS lights; without LIGHTS, a number

@@ -89,7 +89,9 @@ pub(crate) fn run(args: &CompareArgs) -> Result<Status> {
         Metric::MeanRatio => (error.mean_ratio - 1.0).abs(),
     };
     // Not "above": an error that is not a number must fail too.
-    let failed = args.threshold.is_some_and(|threshold| !(judged <= threshold));
+    let failed = args
+        .threshold
+        .is_some_and(|threshold| judged.is_nan() || judged > threshold);
     if args.json {
         let mut json = serde_json::to_value(error)?;
         json["threshold"] = args.threshold.into();

@@ -3,7 +3,7 @@
 mod rows;
 mod write;
 
-use crate::cli::{BudgetArgs, LightArgs, SizeArgs, sampled_method};
+use crate::cli::{BudgetArgs, LightArgs, SizeArgs, default_method, sampled_method};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
@@ -41,7 +41,7 @@ pub(crate) struct DumpArgs {
     #[command(flatten)]
     size: SizeArgs,
     /// How lights are chosen
-    #[arg(long, value_name = "NAME", default_value = "tree-visible", value_parser = sampled_method())]
+    #[arg(long, value_name = "NAME", default_value = default_method(), value_parser = sampled_method())]
     sampler: Method,
     #[command(flatten)]
     light: LightArgs,

@@ -92,8 +92,8 @@ fn program_text() -> String {
     };
     section(
         "",
-        generate::names()
-            .map(|name| (format!("demo:{name}"), demo(name).into()))
+        generate::families()
+            .map(|(name, what)| (format!("demo:{name}"), what.into()))
             .collect(),
     );
     section(
@@ -115,25 +115,11 @@ fn program_json() -> Result<String> {
     let variables = ENVIRONMENT.map(|(name, _)| (name.to_string(), json!(std::env::var(name).ok())));
     let json = json!({
         "machine": Machine::detect(),
-        "demos": pairs(generate::names().map(|name| (name.into(), demo(name).into())).collect()),
+        "demos": pairs(generate::families().map(|(name, what)| (name.into(), what.into())).collect()),
         "samplers": pairs(Method::all().map(|m| (m.name().into(), describe(m).into())).collect()),
         "environment": serde_json::Map::from_iter(variables),
     });
     Ok(serde_json::to_string_pretty(&json)? + "\n")
-}
-
-/// What a generated scene shows.
-fn demo(name: &str) -> &'static str {
-    match name {
-        "rooms" => "a building of many rooms with ceiling lamps and furniture; most lights are hidden",
-        "points" => "the same building, lit by point lights",
-        "plaza" => "a night market: thousands of small lights over three decades of power",
-        "sun-outside" => "rooms, and one light a thousand times stronger that never reaches the image",
-        "keyhole" => "a room lit only through a narrow gap",
-        "spheres" => "glossy materials under many lights",
-        "one-light" => "a single light, for checks",
-        _ => "",
-    }
 }
 
 fn scene_text(loaded: &Loaded) -> String {

@@ -2,7 +2,7 @@
 
 mod stats;
 
-use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method};
+use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
@@ -38,7 +38,7 @@ pub(crate) struct RenderArgs {
     #[command(flatten)]
     size: SizeArgs,
     /// How lights are chosen
-    #[arg(long, value_name = "NAME", default_value = "tree-visible", value_parser = any_method())]
+    #[arg(long, value_name = "NAME", default_value = default_method(), value_parser = any_method())]
     sampler: Method,
     #[command(flatten)]
     light: LightArgs,
@@ -248,6 +248,6 @@ fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &Render
         run.light_build_s,
     ));
     for skipped in stats::skipped(&loaded.scene, run) {
-        message::note(format!("skipped: {skipped}"));
+        message::detail(format!("skipped: {skipped}"));
     }
 }

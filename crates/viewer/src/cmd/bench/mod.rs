@@ -31,6 +31,9 @@ Examples:
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
 measuring is not counted as time, building the light structures and learning are. The runs of a scene take turns frame
 by frame, so that a busy machine slows all of them alike.
+The reference is two independent images a and b. The error of x is (x - a)(x - b) / (r^2 + 0.01 mean(r)^2), r = (a + b) / 2,
+averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
+error, but adds no offset. Efficiency is 1 / (error x seconds) at the end of a run.
 Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
 pub(crate) struct BenchArgs {
     /// .gltf or .glb files, or demo:NAME[:LIGHTS[:SEED]]; default: all generated scenes
@@ -44,10 +47,12 @@ pub(crate) struct BenchArgs {
     /// Runs per sampler, each with another seed; the table shows medians, summary.json also the spread
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
-    /// Samples per pixel of the reference
+    /// Samples per pixel of the reference, half of them in each of its two images
+    ///
+    /// Higher values tell smaller errors apart; lower values are done sooner.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(2..))]
     reference_spp: u64,
-    /// Use this image (.exr) as the reference; with one scene only
+    /// Use this image (.exr) as the reference, whose noise then counts as error; with one scene only
     #[arg(long, value_name = "FILE")]
     reference: Option<PathBuf>,
     /// Folder in which references are kept; default: the user's cache folder

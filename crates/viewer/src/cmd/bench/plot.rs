@@ -3,20 +3,28 @@
 use super::reference::safe_name;
 use super::summary::{Point, SamplerResult, SceneResult};
 use crate::output;
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result};
 use plotters::prelude::*;
+use std::ops::Range;
 use std::path::Path;
 
 /// Colours that people with any kind of colour vision can tell apart (Okabe and Ito 2008); every other line is dashed.
-const COLORS: [RGBColor; 7] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 0, 0),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
     RGBColor(0, 158, 115),
     RGBColor(204, 121, 167),
-    RGBColor(86, 180, 233),
-    RGBColor(230, 159, 0),
-    RGBColor(60, 60, 60),
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(140, 140, 140),
 ];
+
+/// Size of a plot, pixels.
+const SIZE: (u32, u32) = (860, 520);
+
+/// Width of the legend, right of the axes, pixels.
+const LEGEND_WIDTH: i32 = 140;
 
 /// A line: what it is called, and its (x, relMSE).
 type Line<'a> = (&'a str, Vec<(f64, f64)>);
@@ -28,7 +36,7 @@ type Line<'a> = (&'a str, Vec<(f64, f64)>);
 pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
     let name = safe_name(result.what.trim_start_matches("demo:"));
     let lines = |x: fn(&Point) -> f64, points: fn(&SamplerResult) -> Vec<&Point>| -> Vec<Line<'_>> {
-        let line = |s: &SamplerResult| points(s).iter().map(|p| (x(p), p.relmse)).collect::<Vec<_>>();
+        let line = |s: &SamplerResult| points(s).iter().map(|p| (x(p), p.relmse_trimmed)).collect::<Vec<_>>();
         result.samplers.iter().map(|s| (s.sampler, line(s))).collect()
     };
     let over_time = lines(
@@ -40,13 +48,12 @@ pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
         },
     );
     let over_spp = lines(|point| point.at, |s| s.at_frames.iter().collect());
-    let own = result.reference.own_relmse;
     let title = format!("{}, {} lights", result.what, result.lights);
     for (suffix, axis, lines) in [
         ("time", "seconds (light build and learning included)", over_time),
         ("spp", "samples per pixel", over_spp),
     ] {
-        if let Some(svg) = plot(&title, axis, &lines, own)? {
+        if let Some(svg) = plot(&title, axis, &lines)? {
             output::write(&folder.join(format!("{name}-{suffix}.svg")), svg.as_bytes())?;
         }
     }
@@ -54,8 +61,7 @@ pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
 }
 
 /// The plot as SVG; `None` if there is nothing to draw on logarithmic axes.
-fn plot(title: &str, axis: &str, lines: &[Line<'_>], own_relmse: Option<f64>) -> Result<Option<String>> {
-    let drawable = |(x, y): &(f64, f64)| *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite();
+fn plot(title: &str, axis: &str, lines: &[Line<'_>]) -> Result<Option<String>> {
     let all = || {
         lines
             .iter()
@@ -72,61 +78,59 @@ fn plot(title: &str, axis: &str, lines: &[Line<'_>], own_relmse: Option<f64>) ->
     let x_range = range(&mut all().map(|(x, _)| x));
     let y_range = range(&mut all().map(|(_, y)| y));
     let mut svg = String::new();
-    let failed = |error: &dyn std::fmt::Display| anyhow!("cannot draw the plot: {error}");
-    {
-        let area = SVGBackend::with_string(&mut svg, (800, 560)).into_drawing_area();
-        area.fill(&WHITE).map_err(|e| failed(&e))?;
-        let mut chart = ChartBuilder::on(&area)
-            .caption(title, ("sans-serif", 20))
-            .margin(14)
-            .x_label_area_size(48)
-            .y_label_area_size(72)
-            .build_cartesian_2d(x_range.clone().log_scale(), y_range.clone().log_scale())
-            .map_err(|e| failed(&e))?;
-        chart
-            .configure_mesh()
-            .x_desc(axis)
-            .y_desc("relMSE")
-            .x_label_formatter(&|x| format!("{x}"))
-            .y_label_formatter(&|y| format!("{y:e}"))
-            .light_line_style(BLACK.mix(0.06))
-            .bold_line_style(BLACK.mix(0.15))
-            .draw()
-            .map_err(|e| failed(&e))?;
-        for (index, (name, points)) in lines.iter().enumerate() {
-            let style = COLORS[index % COLORS.len()].stroke_width(2);
-            let points: Vec<_> = points.iter().copied().filter(drawable).collect();
-            let dots = points.iter().map(|&at| Circle::new(at, 3, style.filled()));
-            chart.draw_series(dots).map_err(|e| failed(&e))?;
-            if index % 2 == 0 {
-                let line = chart
-                    .draw_series(LineSeries::new(points, style))
-                    .map_err(|e| failed(&e))?;
-                line.label(*name)
-                    .legend(move |(x, y)| PathElement::new([(x, y), (x + 24, y)], style));
-            } else {
-                let dashes = DashedLineSeries::new(points, 8, 5, style);
-                let line = chart.draw_series(dashes).map_err(|e| failed(&e))?;
-                line.label(*name).legend(move |(x, y)| {
-                    let dash = |from, to| PathElement::new(vec![(x + from, y), (x + to, y)], style);
-                    EmptyElement::at((0, 0)) + dash(0, 9) + dash(15, 24)
-                });
-            }
-        }
-        if let Some(own) = own_relmse.filter(|own| y_range.contains(own)) {
-            let floor = DashedLineSeries::new([(x_range.start, own), (x_range.end, own)], 2, 4, BLACK.mix(0.5).into());
-            let line = chart.draw_series(floor).map_err(|e| failed(&e))?;
-            line.label("the reference's own error")
-                .legend(|(x, y)| PathElement::new([(x, y), (x + 24, y)], BLACK.mix(0.5)));
-        }
-        chart
-            .configure_series_labels()
-            .position(SeriesLabelPosition::LowerLeft)
-            .background_style(WHITE.mix(0.85))
-            .border_style(BLACK.mix(0.3))
-            .draw()
-            .map_err(|e| failed(&e))?;
-        area.present().map_err(|e| failed(&e))?;
-    }
+    draw(&mut svg, (title, axis), (x_range, y_range), lines).context("cannot draw the plot")?;
     Ok(Some(svg))
+}
+
+/// Draws points (all on the axes) and lines between them; the legend stands right of the axes, where it hides nothing.
+fn draw(
+    svg: &mut String,
+    (title, axis): (&str, &str),
+    (x_range, y_range): (Range<f64>, Range<f64>),
+    lines: &[Line<'_>],
+) -> Result<()> {
+    let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
+    area.fill(&WHITE)?;
+    let mut chart = ChartBuilder::on(&area)
+        .caption(title, ("sans-serif", 20))
+        .margin(14)
+        .margin_right(14 + LEGEND_WIDTH)
+        .x_label_area_size(48)
+        .y_label_area_size(72)
+        .build_cartesian_2d(x_range.log_scale(), y_range.log_scale())?;
+    chart
+        .configure_mesh()
+        .x_desc(axis)
+        .y_desc("relMSE without the worst 0.1 % of the pixels")
+        .label_style(("sans-serif", 14))
+        .x_label_formatter(&|x| format!("{x}"))
+        .y_label_formatter(&|y| format!("{y:e}"))
+        .light_line_style(BLACK.mix(0.06))
+        .bold_line_style(BLACK.mix(0.15))
+        .draw()?;
+    let legend_x = SIZE.0 as i32 - LEGEND_WIDTH;
+    for (index, (name, points)) in lines.iter().enumerate() {
+        let style = COLORS[index % COLORS.len()].stroke_width(2);
+        let dashed = index % 2 == 1;
+        let points: Vec<_> = points.iter().copied().filter(drawable).collect();
+        chart.draw_series(points.iter().map(|&at| Circle::new(at, 3, style.filled())))?;
+        let y = 60 + 22 * index as i32;
+        let sample = |from, to| PathElement::new([(legend_x + from, y), (legend_x + to, y)], style);
+        if dashed {
+            chart.draw_series(DashedLineSeries::new(points, 8, 5, style))?;
+            area.draw(&sample(0, 10))?;
+            area.draw(&sample(16, 26))?;
+        } else {
+            chart.draw_series(LineSeries::new(points, style))?;
+            area.draw(&sample(0, 26))?;
+        }
+        area.draw(&Text::new(*name, (legend_x + 34, y - 7), ("sans-serif", 15)))?;
+    }
+    area.present()?;
+    Ok(())
+}
+
+/// Whether a point has a place on logarithmic axes.
+fn drawable((x, y): &(f64, f64)) -> bool {
+    *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite()
 }

@@ -1,39 +1,44 @@
 //! References: rendered by `exact`, kept on disk.
 
 use crate::interrupt::Watch;
+use crate::machine;
 use crate::session::{self, Budget};
-use crate::{machine, message, output, table};
 use anyhow::{Context, Result, bail};
 use render::image::{self, Channel};
 use render::{Image, ImageError, Method, Settings};
 use scene::{Camera, Scene};
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// An image to measure against.
+/// What is measured against.
 #[derive(Clone, Debug)]
 pub(super) struct Reference {
-    /// The image.
-    pub(super) image: Image,
+    /// Both halves, or the whole where there are none.
+    images: Vec<Image>,
     /// What is known about it.
     pub(super) facts: Facts,
 }
 
-/// What is known about a reference; kept beside it.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// What is known about a reference.
+#[derive(Clone, Debug, Serialize)]
 pub(super) struct Facts {
     /// Where it comes from.
     pub(super) origin: String,
-    /// Samples per pixel; 0 if unknown.
-    pub(super) spp: u64,
-    /// Its own expected relMSE, in the units of [`render::ImageError::relmse`]; `None` if unknown. This
-    /// much is part of every error measured against it.
-    pub(super) own_relmse: Option<f64>,
+    /// Samples per pixel, those of both halves together; `None` if unknown.
+    pub(super) spp: Option<u64>,
+    /// How errors are measured against it, for people.
+    pub(super) estimator: &'static str,
 }
 
-/// References draw other random numbers than any run: an error shared by both would not be seen.
-const SEED: u64 = 0x9E37_79B9_7F4A_7C15;
+/// [`ImageError::against_halves`].
+const BY_HALVES: &str = "cross product of two independent halves: noise of the reference adds no offset";
+
+/// [`ImageError::between`].
+const PLAIN: &str = "plain: noise of the reference counts as error";
+
+/// Seeds of the halves. References draw other random numbers than any run: an error shared by both would not be seen.
+const SEEDS: [u64; 2] = [0x9E37_79B9_7F4A_7C15, 0xD1B5_4A32_D192_ED03];
 
 /// The user's cache folder for references, or one below `output` where there is none.
 pub(super) fn default_cache(output: &Path) -> PathBuf {
@@ -66,16 +71,19 @@ impl Reference {
                 settings.height
             );
         }
-        let origin = path.display().to_string();
         let facts = Facts {
-            origin,
-            spp: 0,
-            own_relmse: None,
+            origin: path.display().to_string(),
+            spp: None,
+            estimator: PLAIN,
         };
-        Ok(Self { image, facts })
+        Ok(Self {
+            images: vec![image],
+            facts,
+        })
     }
 
-    /// Takes it from the cache, or renders it with `spp` samples per pixel and puts it there; `None` if interrupted.
+    /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to an even number), half of them
+    /// in each of two images with different seeds, and puts it there; `None` if interrupted.
     ///
     /// # Errors
     /// Settings out of range, a cache that cannot be written.
@@ -87,83 +95,55 @@ impl Reference {
         cache: &Path,
         watch: &Watch,
     ) -> Result<Option<Self>> {
-        let settings = Settings {
-            method: Method::Exact,
-            seed: SEED,
-            light: light_cache::Settings::default(),
-            ..settings.clone()
-        };
-        let key = key(scene, camera, &settings, spp)?;
-        let (image_path, facts_path) = (cache.join(format!("{key}.exr")), cache.join(format!("{key}.json")));
-        if let Some(found) = from_cache(&image_path, &facts_path) {
-            return Ok(Some(found));
-        }
-        let mut frames = session::start(scene, camera, &settings)?;
-        let budget = Budget {
-            frames: Some(spp),
-            seconds: None,
-        };
-        let what = format!("reference of {}, kept for next time", scene.parts.name);
-        let mut half = None;
-        session::render_frames(frames.as_mut(), budget, watch, &what, |state| {
-            if state.film().spp() == spp / 2 {
-                half = Some(state.film().image());
+        let each = spp.div_ceil(2);
+        let mut images = Vec::with_capacity(SEEDS.len());
+        for (half, seed) in (1..).zip(SEEDS) {
+            let settings = Settings {
+                method: Method::Exact,
+                seed,
+                light: light_cache::Settings::default(),
+                ..settings.clone()
+            };
+            let path = cache.join(key(scene, camera, &settings, each)? + ".exr");
+            if let Ok(kept) = image::read_exr(&path) {
+                images.push(kept);
+                continue;
             }
-        });
-        if watch.stopped() {
-            return Ok(None);
+            let mut frames = session::start(scene, camera, &settings)?;
+            let budget = Budget {
+                frames: Some(each),
+                seconds: None,
+            };
+            let what = format!(
+                "reference of {}, half {half} of 2, kept for next time",
+                scene.parts.name
+            );
+            session::render_frames(frames.as_mut(), budget, watch, &what, |_| {});
+            if watch.stopped() {
+                return Ok(None);
+            }
+            let image = frames.film().image();
+            std::fs::create_dir_all(cache)
+                .with_context(|| format!("{}: cannot make the cache folder", cache.display()))?;
+            image::write_exr(&path, image.width, image.height, &Channel::rgb("", &image), &[])?;
+            images.push(image);
         }
-        let image = frames.film().image();
         let facts = Facts {
-            origin: format!("exact, {spp} samples per pixel, manylight {}", machine::VERSION),
-            spp,
-            own_relmse: half.and_then(|half| own_relmse(&image, &half, spp)),
+            origin: format!("exact, 2 x {each} samples per pixel, manylight {}", machine::VERSION),
+            spp: Some(2 * each),
+            estimator: BY_HALVES,
         };
-        std::fs::create_dir_all(cache).with_context(|| format!("{}: cannot make the cache folder", cache.display()))?;
-        // The image first: without its facts a cached image does not count.
-        image::write_exr(&image_path, image.width, image.height, &Channel::rgb("", &image), &[])?;
-        output::write(&facts_path, &serde_json::to_vec_pretty(&facts)?)?;
-        Ok(Some(Self { image, facts }))
+        Ok(Some(Self { images, facts }))
     }
 
-    /// Warns where the reference's own noise is a good part of the least error that was measured against it.
-    pub(super) fn warn_if_noisy(&self, scene: &str, least_relmse: f64) {
-        const NEGLIGIBLE: f64 = 0.1;
-        if let Some(own) = self.facts.own_relmse
-            && own > NEGLIGIBLE * least_relmse
-        {
-            message::warn(format!(
-                "{scene}: the reference's own relMSE of about {} is not negligible beside the least error of {}; \
-                 raise --reference-spp (now {})",
-                table::number(own),
-                table::number(least_relmse),
-                self.facts.spp
-            ));
+    /// The error of `image`; `None` if it has another size.
+    pub(super) fn error(&self, image: &Image) -> Option<ImageError> {
+        match self.images.as_slice() {
+            [a, b] => ImageError::against_halves(image, a, b),
+            [whole] => ImageError::between(image, whole),
+            _ => None,
         }
     }
-}
-
-fn from_cache(image: &Path, facts: &Path) -> Option<Reference> {
-    let facts = serde_json::from_slice(&std::fs::read(facts).ok()?).ok()?;
-    let image = image::read_exr(image).ok()?;
-    Some(Reference { image, facts })
-}
-
-/// What relMSE a perfect image would show against `image`, by how far its first half and the rest are apart: these are
-/// independent, and each has twice the variance of the whole. Unlike the pixels' variances this sees rare events, such
-/// as a small lamp at the border of a pixel, that one half has missed.
-fn own_relmse(image: &Image, half: &Image, spp: u64) -> Option<f64> {
-    let first = (spp / 2) as f32 / spp as f32;
-    let rest = |(whole, half): (&[f32; 3], &[f32; 3])| {
-        // Never below 0, whatever rounding does.
-        std::array::from_fn(|c| ((whole[c] - first * half[c]) / (1.0 - first)).max(0.0))
-    };
-    let other = Image {
-        pixels: image.pixels.iter().zip(&half.pixels).map(rest).collect(),
-        width: image.width,
-        height: image.height,
-    };
-    Some(ImageError::between(half, &other)?.relmse / 4.0)
 }
 
 /// Names a reference by all that its pixels depend on: the scene's content, the camera, the settings, the version.

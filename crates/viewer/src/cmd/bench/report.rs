@@ -1,6 +1,6 @@
 //! Results as text and files.
 
-use super::summary::SceneResult;
+use super::summary::{Point, SamplerResult, SceneResult};
 use crate::machine::{self, Machine};
 use crate::output;
 use crate::table::{align, number, thousands};
@@ -9,51 +9,93 @@ use render::Settings;
 use serde_json::json;
 use std::path::Path;
 
-/// The table of one scene, for people.
+/// The tables of one scene, for people: frame times and efficiency, then errors.
 pub(super) fn table(result: &SceneResult) -> String {
-    let mut header: Vec<String> = ["sampler", "frames", "median ms", "p95", "p99", "max", "build ms"]
-        .map(String::from)
-        .to_vec();
-    let longest = result.samplers.iter().max_by_key(|sampler| sampler.at_time.len());
-    let times: Vec<f64> = longest
-        .map(|s| s.at_time.iter().map(|point| point.at).collect())
-        .unwrap_or_default();
-    header.extend(times.iter().map(|time| format!("relMSE {time} s")));
-    header.extend(["trimmed", "efficiency", "x uniform", "x best other"].map(String::from));
-    let rows: Vec<Vec<String>> = result
-        .samplers
-        .iter()
-        .map(|s| {
-            let at = |time: f64| s.at_time.iter().find(|point| point.at == time);
-            let mut row = vec![s.sampler.to_string(), s.frames.to_string()];
-            let numbers = [
-                s.frame_ms_median,
-                s.frame_ms_p95,
-                s.frame_ms_p99,
-                s.frame_ms_max,
-                s.light_build_s * 1e3,
-            ];
-            row.extend(numbers.map(number));
-            row.extend(
-                times
-                    .iter()
-                    .map(|&time| number(at(time).map_or(f64::NAN, |point| point.relmse))),
-            );
-            row.push(number(s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed)));
-            row.extend([s.efficiency, s.to_uniform, s.to_best_other].map(|value| number(value.unwrap_or(f64::NAN))));
-            row
-        })
-        .collect();
-    let header: Vec<&str> = header.iter().map(String::as_str).collect();
-    format!(
-        "{}: {} lights, {} triangles; reference: {}, own relMSE {}\n{}\n",
+    let mut text = format!(
+        "{}: {} lights, {} triangles; reference: {}; errors: {}\n{}\n",
         result.what,
         thousands(result.lights as u64),
         thousands(result.triangles),
         result.reference.origin,
-        number(result.reference.own_relmse.unwrap_or(f64::NAN)),
-        align(&header, &rows, 1)
-    )
+        result.reference.estimator,
+        times_table(result)
+    );
+    text += "relMSE without the worst 0.1 % of the pixels, +- one standard error of the last:\n";
+    text += &errors_table(result);
+    if all_points(result).any(Point::is_noise) {
+        text += "~ less than two standard errors above 0: a better reference (--reference-spp) would tell\n";
+    }
+    text + "\n"
+}
+
+fn all_points(result: &SceneResult) -> impl Iterator<Item = &Point> {
+    result
+        .samplers
+        .iter()
+        .flat_map(|s| s.at_frames.iter().chain(&s.at_time))
+}
+
+fn times_table(result: &SceneResult) -> String {
+    let header = [
+        "sampler",
+        "frames",
+        "median ms",
+        "p95",
+        "p99",
+        "max",
+        "build ms",
+        "learn ms",
+        "efficiency",
+        "x uniform",
+        "x best other",
+    ];
+    let row = |s: &SamplerResult| {
+        let times = [s.frame_ms_median, s.frame_ms_p95, s.frame_ms_p99, s.frame_ms_max];
+        let seconds = [s.light_build_s, s.learn_s];
+        let ratios = [s.efficiency, s.to_uniform, s.to_best_other];
+        [s.sampler.to_string(), s.frames.to_string()]
+            .into_iter()
+            .chain(times.map(number))
+            .chain(seconds.map(|s| number(s * 1e3)))
+            .chain(ratios.map(|value| number(value.unwrap_or(f64::NAN))))
+            .collect()
+    };
+    align(&header, &result.samplers.iter().map(row).collect::<Vec<_>>(), 1)
+}
+
+/// Errors after 1, 4, 16 ... frames and at the times asked for.
+fn errors_table(result: &SceneResult) -> String {
+    let moments = |points: fn(&SamplerResult) -> &[Point]| {
+        let mut all: Vec<f64> = result.samplers.iter().flat_map(points).map(|p| p.at).collect();
+        all.sort_by(f64::total_cmp);
+        all.dedup();
+        all
+    };
+    let mut frames = moments(|s| &s.at_frames);
+    frames.retain(|count| count.log2() % 2.0 == 0.0);
+    let times = moments(|s| &s.at_time);
+    let header: Vec<String> = std::iter::once("sampler".into())
+        .chain(frames.iter().map(|count| format!("{count} spp")))
+        .chain(times.iter().map(|time| format!("{time} s")))
+        .chain(["+-".into()])
+        .collect();
+    let cell = |points: &[Point], at: f64| {
+        let point = points.iter().find(|point| point.at == at);
+        point.map_or("-".into(), |point| {
+            let mark = if point.is_noise() { "~" } else { "" };
+            format!("{mark}{}", number(point.relmse_trimmed))
+        })
+    };
+    let row = |s: &SamplerResult| {
+        let last = s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed_se);
+        std::iter::once(s.sampler.to_string())
+            .chain(frames.iter().map(|&at| cell(&s.at_frames, at)))
+            .chain(times.iter().map(|&at| cell(&s.at_time, at)))
+            .chain([number(last)])
+            .collect()
+    };
+    let header: Vec<&str> = header.iter().map(String::as_str).collect();
+    align(&header, &result.samplers.iter().map(row).collect::<Vec<_>>(), 1)
 }
 
 /// Writes `frames.csv`, `summary.json` and `setup.md`.
@@ -73,15 +115,23 @@ pub(super) fn write_all(folder: &Path, machine: &Machine, settings: &Settings, r
             "mse",
             "relmse",
             "relmse_trimmed",
+            "relmse_trimmed_se",
             "smape",
             "mean_ratio",
         ])?;
         for (result, run) in results.iter().flat_map(|r| r.runs.iter().map(move |run| (r, run))) {
             for (index, frame) in run.frames.iter().enumerate() {
-                let error = frame
-                    .error
-                    .map(|e| [e.mse, e.relmse, e.relmse_trimmed, e.smape, e.mean_ratio]);
-                let errors = error.map_or([const { String::new() }; 5], |values| values.map(|v| v.to_string()));
+                let errors = frame.error.map_or([const { String::new() }; 6], |e| {
+                    [
+                        e.mse,
+                        e.relmse,
+                        e.relmse_trimmed,
+                        e.relmse_trimmed_se,
+                        e.smape,
+                        e.mean_ratio,
+                    ]
+                    .map(|value| value.to_string())
+                });
                 let mut row = vec![
                     result.what.clone(),
                     run.method.name().into(),
@@ -118,8 +168,8 @@ fn setup(machine: &Machine, settings: &Settings, results: &[SceneResult]) -> Str
          - {}, {} logical processors, {} threads, SIMD {}, {}\n\
          - {} x {} pixels, {} bounces, seeds from {}\n\n\
          Every run learns from scratch; light build and learning count, measuring does not. Efficiency is \
-         1 / (relMSE x seconds) at the end of a run, medians over the seeds. \"trimmed\" is the relMSE at the last time \
-         without the worst 0.1 % of the pixels.\n",
+         1 / (relMSE x seconds) at the end of a run. Figures are medians over the seeds; relMSE is without the worst 0.1 % \
+         of the pixels (summary.json has it over all pixels, too).\n",
         machine::today(),
         machine.version,
         machine.commit.unwrap_or("unknown"),

@@ -130,7 +130,7 @@ impl<'s> Active<'s> {
         self.next_time += passed;
         let due = passed > 0 || count.is_power_of_two();
         let error = if due {
-            ImageError::between(&self.renderer.film().image(), &reference.image)
+            reference.error(&self.renderer.film().image())
         } else {
             None
         };

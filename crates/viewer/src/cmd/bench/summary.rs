@@ -3,7 +3,7 @@
 use super::reference::{Facts, Reference};
 use super::run::{Frame, Run};
 use crate::session::Loaded;
-use render::Method;
+use render::{ImageError, Method};
 use serde::Serialize;
 
 /// All that was measured on one scene.
@@ -55,10 +55,11 @@ pub(super) struct SamplerResult {
     pub(super) at_time: Vec<Point>,
     /// Errors at equal numbers of frames.
     pub(super) at_frames: Vec<Point>,
-    /// 1 / (relMSE x seconds) at the end, median over the runs.
+    /// 1 / (trimmed relMSE x seconds) at the end, median over the runs; `None` where the error is not above 0: lost in
+    /// the noise of the reference.
     pub(super) efficiency: Option<f64>,
-    /// The same with the trimmed relMSE.
-    pub(super) efficiency_trimmed: Option<f64>,
+    /// The same with the plain relMSE.
+    pub(super) efficiency_untrimmed: Option<f64>,
     /// Efficiency over that of `uniform`.
     pub(super) to_uniform: Option<f64>,
     /// Efficiency over that of the best other sampler.
@@ -72,18 +73,20 @@ pub(super) struct Point {
     pub(super) at: f64,
     /// When it was measured, seconds since the start, everything included.
     pub(super) elapsed_s: f64,
-    /// relMSE.
-    pub(super) relmse: f64,
-    /// Least over the runs.
-    pub(super) relmse_min: f64,
-    /// Largest over the runs.
-    pub(super) relmse_max: f64,
-    /// relMSE without the worst 0.1 % of the pixels.
+    /// relMSE without the worst 0.1 % of the pixels: what tables and plots show.
     pub(super) relmse_trimmed: f64,
+    /// Least over the runs.
+    pub(super) relmse_trimmed_min: f64,
+    /// Largest over the runs.
+    pub(super) relmse_trimmed_max: f64,
+    /// Standard error of that of one run.
+    pub(super) relmse_trimmed_se: f64,
+    /// relMSE over all pixels.
+    pub(super) relmse: f64,
 }
 
 impl SceneResult {
-    /// Works out the figures; warns if the reference is too noisy for them.
+    /// Works out the figures.
     pub(super) fn new(
         loaded: &Loaded,
         methods: &[Method],
@@ -103,10 +106,6 @@ impl SceneResult {
             let best = others.filter_map(|(_, e)| *e).max_by(f64::total_cmp);
             let over = |other: Option<f64>| Some(sampler.efficiency? / other?);
             (sampler.to_uniform, sampler.to_best_other) = (over(uniform), over(best));
-        }
-        let last = runs.iter().filter_map(|run| run.last_measured()?.error);
-        if let Some(least) = last.map(|error| error.relmse).min_by(f64::total_cmp) {
-            reference.warn_if_noisy(&loaded.what, least);
         }
         Self {
             what: loaded.what.clone(),
@@ -134,13 +133,14 @@ impl SamplerResult {
         let powers = (0..usize::BITS)
             .map(|bit| 1usize << bit)
             .take_while(|&count| count <= most);
-        let efficiency = |pick: fn(&Frame) -> Option<f64>| {
-            let all = runs.iter().filter_map(|run| {
+        let efficiency = |pick: fn(&ImageError) -> f64| {
+            let costs = runs.iter().filter_map(|run| {
                 let last = run.last_measured()?;
-                let value = 1.0 / (pick(last)? * last.elapsed_s);
-                value.is_finite().then_some(value)
+                Some(pick(last.error.as_ref()?) * last.elapsed_s)
             });
-            median(all.collect())
+            median(costs.collect())
+                .map(|cost| 1.0 / cost)
+                .filter(|value| value.is_finite() && *value > 0.0)
         };
         Self {
             sampler: method.name(),
@@ -159,8 +159,8 @@ impl SamplerResult {
             at_frames: powers
                 .filter_map(|n| Point::new(n as f64, runs, |run| run.frames.get(n - 1)))
                 .collect(),
-            efficiency: efficiency(|frame| Some(frame.error?.relmse)),
-            efficiency_trimmed: efficiency(|frame| Some(frame.error?.relmse_trimmed)),
+            efficiency: efficiency(|error| error.relmse_trimmed),
+            efficiency_untrimmed: efficiency(|error| error.relmse),
             to_uniform: None,
             to_best_other: None,
         }
@@ -174,16 +174,26 @@ impl Point {
             .filter_map(|run| pick(run))
             .filter_map(|f| Some((f, f.error?)))
             .collect();
-        let mut relmse: Vec<f64> = frames.iter().map(|(_, error)| error.relmse).collect();
-        relmse.sort_by(f64::total_cmp);
+        let errors = |pick: fn(&ImageError) -> f64| {
+            let mut all: Vec<f64> = frames.iter().map(|(_, error)| pick(error)).collect();
+            all.sort_by(f64::total_cmp);
+            all
+        };
+        let trimmed = errors(|error| error.relmse_trimmed);
         Some(Self {
             at,
             elapsed_s: median(frames.iter().map(|(frame, _)| frame.elapsed_s).collect())?,
-            relmse: quantile(&relmse, 0.5),
-            relmse_min: quantile(&relmse, 0.0),
-            relmse_max: quantile(&relmse, 1.0),
-            relmse_trimmed: median(frames.iter().map(|(_, error)| error.relmse_trimmed).collect())?,
+            relmse_trimmed: quantile(&trimmed, 0.5),
+            relmse_trimmed_min: quantile(&trimmed, 0.0),
+            relmse_trimmed_max: quantile(&trimmed, 1.0),
+            relmse_trimmed_se: quantile(&errors(|error| error.relmse_trimmed_se), 0.5),
+            relmse: quantile(&errors(|error| error.relmse), 0.5),
         })
+    }
+
+    /// Whether the error cannot be told from none: less than two standard errors above 0.
+    pub(super) fn is_noise(&self) -> bool {
+        self.relmse_trimmed < 2.0 * self.relmse_trimmed_se
     }
 }
 

@@ -174,7 +174,7 @@ mod tests {
     use scene::LightKind;
 
     fn table() -> Vec<Row> {
-        let row = |light: u64, visible_fraction| Row {
+        let row = |light: u64, visible_fraction: Option<f64>| Row {
             light,
             name: format!("lamp, \"{light}\""),
             kind: LightKind::Point,
