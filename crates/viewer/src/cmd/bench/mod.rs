@@ -33,7 +33,8 @@ measuring is not counted as time, building the light structures and learning are
 by frame, so that a busy machine slows all of them alike.
 The reference is two independent images a and b. The error of x is (x - a)(x - b) / (r^2 + 0.01 mean(r)^2), r = (a + b) / 2,
 averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
-error, but adds no offset. Efficiency is 1 / (error x seconds) at the end of a run.
+error, but adds no offset. Efficiency is 1 / (error x seconds), at the latest time at which the
+errors of all samplers stand out of the reference's noise.
 Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
 pub(crate) struct BenchArgs {
     /// .gltf or .glb files, or demo:NAME[:LIGHTS[:SEED]]; default: all generated scenes

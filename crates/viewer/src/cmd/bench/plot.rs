@@ -36,7 +36,13 @@ type Line<'a> = (&'a str, Vec<(f64, f64)>);
 pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
     let name = safe_name(result.what.trim_start_matches("demo:"));
     let lines = |x: fn(&Point) -> f64, points: fn(&SamplerResult) -> Vec<&Point>| -> Vec<Line<'_>> {
-        let line = |s: &SamplerResult| points(s).iter().map(|p| (x(p), p.relmse_trimmed)).collect::<Vec<_>>();
+        let line = |s: &SamplerResult| {
+            points(s)
+                .iter()
+                .filter(|p| !p.is_noise())
+                .map(|p| (x(p), p.relmse_trimmed))
+                .collect::<Vec<_>>()
+        };
         result.samplers.iter().map(|s| (s.sampler, line(s))).collect()
     };
     let over_time = lines(

@@ -36,6 +36,10 @@ fn all_points(result: &SceneResult) -> impl Iterator<Item = &Point> {
 }
 
 fn times_table(result: &SceneResult) -> String {
+    let efficiency = match result.efficiency_at_s {
+        Some(time) => format!("efficiency at {time} s"),
+        None => "efficiency".into(),
+    };
     let header = [
         "sampler",
         "frames",
@@ -45,7 +49,7 @@ fn times_table(result: &SceneResult) -> String {
         "max",
         "build ms",
         "learn ms",
-        "efficiency",
+        &efficiency,
         "x uniform",
         "x best other",
     ];
@@ -168,8 +172,9 @@ fn setup(machine: &Machine, settings: &Settings, results: &[SceneResult]) -> Str
          - {}, {} logical processors, {} threads, SIMD {}, {}\n\
          - {} x {} pixels, {} bounces, seeds from {}\n\n\
          Every run learns from scratch; light build and learning count, measuring does not. Efficiency is \
-         1 / (relMSE x seconds) at the end of a run. Figures are medians over the seeds; relMSE is without the worst 0.1 % \
-         of the pixels (summary.json has it over all pixels, too).\n",
+         1 / (relMSE x seconds), at the latest time at which all errors stand out of the reference's noise. \
+         Figures are medians over the seeds; relMSE is without the worst 0.1 % of the pixels (summary.json has it over \
+         all pixels, too).\n",
         machine::today(),
         machine.version,
         machine.commit.unwrap_or("unknown"),

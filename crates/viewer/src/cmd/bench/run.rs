@@ -87,11 +87,6 @@ impl Run {
             .iter()
             .find(|frame| frame.elapsed_s >= time && frame.error.is_some())
     }
-
-    /// The last state that was measured.
-    pub(super) fn last_measured(&self) -> Option<&Frame> {
-        self.frames.iter().rev().find(|frame| frame.error.is_some())
-    }
 }
 
 impl<'s> Active<'s> {

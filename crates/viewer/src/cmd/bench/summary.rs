@@ -23,6 +23,9 @@ pub(super) struct SceneResult {
     pub(super) build_s: f64,
     /// What the errors are measured against.
     pub(super) reference: Facts,
+    /// Where efficiencies are compared: the latest of the times at which the reference is good enough to tell the error
+    /// of every sampler. `None` if it never is.
+    pub(super) efficiency_at_s: Option<f64>,
     /// One entry per sampler.
     pub(super) samplers: Vec<SamplerResult>,
     /// Everything that was measured.
@@ -55,18 +58,15 @@ pub(super) struct SamplerResult {
     pub(super) at_time: Vec<Point>,
     /// Errors at equal numbers of frames.
     pub(super) at_frames: Vec<Point>,
-    /// 1 / (trimmed relMSE x seconds) at the end, median over the runs; `None` where the error is not above 0: lost in
-    /// the noise of the reference.
+    /// [`Point::efficiency`] at [`SceneResult::efficiency_at_s`].
     pub(super) efficiency: Option<f64>,
-    /// The same with the plain relMSE.
-    pub(super) efficiency_untrimmed: Option<f64>,
     /// Efficiency over that of `uniform`.
     pub(super) to_uniform: Option<f64>,
     /// Efficiency over that of the best other sampler.
     pub(super) to_best_other: Option<f64>,
 }
 
-/// The error at one moment: medians over the runs that came so far, and the spread over them.
+/// The error at one moment: medians over the runs, and the spread over them.
 #[derive(Debug, Serialize)]
 pub(super) struct Point {
     /// The time or number of frames asked for.
@@ -83,6 +83,8 @@ pub(super) struct Point {
     pub(super) relmse_trimmed_se: f64,
     /// relMSE over all pixels.
     pub(super) relmse: f64,
+    /// 1 / (`relmse_trimmed` x `elapsed_s`); `None` where the error is not above 0: lost in the reference's noise.
+    pub(super) efficiency: Option<f64>,
 }
 
 impl SceneResult {
@@ -96,6 +98,15 @@ impl SceneResult {
     ) -> Self {
         let of = |method: Method| runs.iter().filter(|run| run.method == method).collect::<Vec<_>>();
         let mut samplers: Vec<_> = methods.iter().map(|&m| SamplerResult::new(m, &of(m), times)).collect();
+        let told = |time: &&f64| {
+            let mut points = samplers.iter().map(|s| s.at_time.iter().find(|p| p.at == **time));
+            points.all(|point| point.is_some_and(|point| !point.is_noise()))
+        };
+        let efficiency_at_s = times.iter().rev().find(told).copied();
+        for sampler in &mut samplers {
+            let point = sampler.at_time.iter().find(|point| Some(point.at) == efficiency_at_s);
+            sampler.efficiency = point.and_then(|point| point.efficiency);
+        }
         let efficiencies: Vec<Option<f64>> = samplers.iter().map(|s| s.efficiency).collect();
         let uniform = samplers
             .iter()
@@ -115,6 +126,7 @@ impl SceneResult {
             load_s: loaded.load_s,
             build_s: loaded.scene.build_s,
             reference: reference.facts.clone(),
+            efficiency_at_s,
             samplers,
             runs,
         }
@@ -133,15 +145,6 @@ impl SamplerResult {
         let powers = (0..usize::BITS)
             .map(|bit| 1usize << bit)
             .take_while(|&count| count <= most);
-        let efficiency = |pick: fn(&ImageError) -> f64| {
-            let costs = runs.iter().filter_map(|run| {
-                let last = run.last_measured()?;
-                Some(pick(last.error.as_ref()?) * last.elapsed_s)
-            });
-            median(costs.collect())
-                .map(|cost| 1.0 / cost)
-                .filter(|value| value.is_finite() && *value > 0.0)
-        };
         Self {
             sampler: method.name(),
             seeds: runs.len(),
@@ -159,8 +162,7 @@ impl SamplerResult {
             at_frames: powers
                 .filter_map(|n| Point::new(n as f64, runs, |run| run.frames.get(n - 1)))
                 .collect(),
-            efficiency: efficiency(|error| error.relmse_trimmed),
-            efficiency_untrimmed: efficiency(|error| error.relmse),
+            efficiency: None,
             to_uniform: None,
             to_best_other: None,
         }
@@ -168,26 +170,33 @@ impl SamplerResult {
 }
 
 impl Point {
+    /// `None` unless all runs came so far: the slower ones would be missing.
     fn new<'r>(at: f64, runs: &[&'r Run], pick: impl Fn(&'r Run) -> Option<&'r Frame>) -> Option<Self> {
         let frames: Vec<_> = runs
             .iter()
             .filter_map(|run| pick(run))
             .filter_map(|f| Some((f, f.error?)))
             .collect();
+        if frames.len() < runs.len() {
+            return None;
+        }
         let errors = |pick: fn(&ImageError) -> f64| {
             let mut all: Vec<f64> = frames.iter().map(|(_, error)| pick(error)).collect();
             all.sort_by(f64::total_cmp);
             all
         };
         let trimmed = errors(|error| error.relmse_trimmed);
+        let relmse_trimmed = quantile(&trimmed, 0.5);
+        let elapsed_s = median(frames.iter().map(|(frame, _)| frame.elapsed_s).collect())?;
         Some(Self {
             at,
-            elapsed_s: median(frames.iter().map(|(frame, _)| frame.elapsed_s).collect())?,
-            relmse_trimmed: quantile(&trimmed, 0.5),
+            elapsed_s,
+            relmse_trimmed,
             relmse_trimmed_min: quantile(&trimmed, 0.0),
             relmse_trimmed_max: quantile(&trimmed, 1.0),
             relmse_trimmed_se: quantile(&errors(|error| error.relmse_trimmed_se), 0.5),
             relmse: quantile(&errors(|error| error.relmse), 0.5),
+            efficiency: (relmse_trimmed > 0.0).then(|| 1.0 / (relmse_trimmed * elapsed_s)),
         })
     }
 
