@@ -15,6 +15,7 @@ mod dispatch;
 mod octree;
 mod power;
 mod records;
+mod schedule;
 pub mod settings;
 mod table;
 #[cfg(test)]
@@ -127,6 +128,13 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// Whether the sampler wants observations at all; if not, the integrator collects none.
     const LEARNS: bool;
+
+    /// Whether the frame that is being rendered, or comes next, will be learned from: else its log may stay empty. The
+    /// answer changes in [`LightSampler::end_frame`] and [`LightSampler::set_eye`] only.
+    #[inline]
+    fn wants_observations(&self) -> bool {
+        Self::LEARNS
+    }
 
     /// Tells where the eye is, before the first frame and when it has moved: samplers that keep cells make them finer
     /// near it.

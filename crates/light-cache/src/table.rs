@@ -9,7 +9,9 @@
 
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;
+use crate::schedule::Schedule;
 use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, records};
+use glam::Vec3;
 use sampling::Discrete;
 use scene::{Light, Scene};
 use std::time::Instant;
@@ -35,6 +37,9 @@ pub struct TableSampler {
     prior: Vec<f64>,
     brightness: Brightness,
     settings: Settings,
+    /// Which frames are learned from.
+    schedule: Schedule,
+    /// Frames learned from so far.
     frame: u32,
     build_s: f64,
     learn_s: f64,
@@ -80,6 +85,7 @@ impl TableSampler {
             prior,
             brightness: Brightness::new(radius),
             settings: settings.clone(),
+            schedule: Schedule::default(),
             frame: 0,
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
@@ -93,8 +99,8 @@ impl TableSampler {
         }
     }
 
-    /// Learns from a frame; see [`LightSampler::end_frame`].
-    fn learn(&mut self, logs: &[Vec<Observation>]) {
+    /// Learns from a frame that is one to learn from.
+    pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
         let start = Instant::now();
         self.frame += 1;
         if self.secondary.is_none() && logs.iter().flatten().any(|o| !o.point.primary) {
@@ -251,8 +257,18 @@ impl LightSampler for TableSampler {
         local.map_or(0.0, |distribution| distribution.pmf(light))
     }
 
+    fn wants_observations(&self) -> bool {
+        self.schedule.wants_observations()
+    }
+
+    fn set_eye(&mut self, _eye_ws: Vec3) {
+        self.schedule.restart();
+    }
+
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
-        self.learn(logs);
+        if let Some(logs) = self.schedule.end_frame(logs) {
+            self.learn(&logs);
+        }
     }
 
     fn stats(&self) -> SamplerStats {

@@ -11,8 +11,10 @@
 mod visibility;
 
 use crate::records;
+use crate::schedule::Schedule;
 use crate::tree::{Descent, Floor, Tree, position, probability};
 use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint};
+use glam::Vec3;
 use scene::{Light, Scene};
 use std::time::Instant;
 use visibility::Visibility;
@@ -26,6 +28,8 @@ pub struct TreeVisibleSampler {
     tree: Tree,
     visibility: Visibility,
     floor: Floor,
+    /// Which frames are learned from.
+    schedule: Schedule,
     /// Observations since the tree was last weighted.
     fresh: usize,
     observations: u64,
@@ -48,6 +52,7 @@ impl TreeVisibleSampler {
         Self {
             visibility: Visibility::new(&tree),
             floor: Floor::new(settings.min_probability_mass, lights.len()),
+            schedule: Schedule::default(),
             fresh: 0,
             observations: 0,
             build_s: start.elapsed().as_secs_f64(),
@@ -62,7 +67,7 @@ impl TreeVisibleSampler {
         &self.tree
     }
 
-    /// Learns from a frame; see [`LightSampler::end_frame`].
+    /// Learns from a frame that is one to learn from.
     pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
         let start = Instant::now();
         for observation in logs.iter().flatten() {
@@ -133,8 +138,18 @@ impl LightSampler for TreeVisibleSampler {
         }
     }
 
+    fn wants_observations(&self) -> bool {
+        self.schedule.wants_observations()
+    }
+
+    fn set_eye(&mut self, _eye_ws: Vec3) {
+        self.schedule.restart();
+    }
+
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
-        self.learn(logs);
+        if let Some(logs) = self.schedule.end_frame(logs) {
+            self.learn(&logs);
+        }
     }
 
     fn stats(&self) -> SamplerStats {

@@ -99,7 +99,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         let visible = connection
             .as_ref()
             .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
-        if S::LEARNS {
+        if S::LEARNS && self.0.wants_observations() {
             log.observations.push(Observation {
                 point: vertex.point,
                 light: choice.light,

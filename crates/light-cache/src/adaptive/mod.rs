@@ -16,6 +16,7 @@ mod cell;
 mod cells;
 mod grid;
 
+use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
     Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
@@ -25,19 +26,10 @@ use cell::{Cell, FirstMass};
 use cells::Cells;
 use glam::Vec3;
 use scene::Scene;
-use std::borrow::Cow;
 use std::time::Instant;
 
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
 const TABLE_SHARE: f64 = 0.03;
-/// Frames after the eye has moved that are all learned from; later every [`LATER_STEP`]th is, for little is new in them.
-/// Higher values learn more; lower values are faster.
-const FIRST_FRAMES: u32 = 24;
-/// See [`FIRST_FRAMES`].
-const LATER_STEP: u32 = 4;
-/// Observations that are learned from in one frame, at most: larger images are thinned, so that learning costs the same
-/// at any size. Higher values learn more; lower values are faster.
-const MAX_OBSERVATIONS: usize = 1 << 16;
 
 /// Learned cuts.
 #[derive(Debug)]
@@ -47,8 +39,8 @@ pub struct AdaptiveSampler {
     table: TableSampler,
     cells: Cells,
     first_mass: FirstMass,
-    /// Frames since the eye has moved.
-    frame: u32,
+    /// Which frames are learned from.
+    schedule: Schedule,
     build_s: f64,
     learn_s: f64,
 }
@@ -71,23 +63,6 @@ enum Source<'a> {
     Tree(Descent<'a>),
     /// No light can contribute.
     Nothing,
-}
-
-/// Every nth observation, so that at most [`MAX_OBSERVATIONS`] or so are left; which ones changes with the frame.
-fn thinned(logs: &[Vec<Observation>], frame: u32) -> Cow<'_, [Vec<Observation>]> {
-    let step = logs
-        .iter()
-        .map(Vec::len)
-        .sum::<usize>()
-        .div_ceil(MAX_OBSERVATIONS)
-        .max(1);
-    if step == 1 {
-        return Cow::Borrowed(logs);
-    }
-    let first = frame as usize % step;
-    logs.iter()
-        .map(|log| log.iter().skip(first).step_by(step).copied().collect())
-        .collect()
 }
 
 /// The part of a random number's range that stands for the probability `mass` x 2^-32.
@@ -118,7 +93,7 @@ impl AdaptiveSampler {
             table: TableSampler::new(lights, scene.radius, &within_table),
             cells: Cells::new(scene.center_ws, scene.radius, first_mass, Tree::unit(lights)),
             first_mass,
-            frame: 0,
+            schedule: Schedule::default(),
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
         }
@@ -129,9 +104,14 @@ impl LightSampler for AdaptiveSampler {
     type Local<'a> = Local<'a>;
     const LEARNS: bool = true;
 
+    #[inline]
+    fn wants_observations(&self) -> bool {
+        self.schedule.wants_observations()
+    }
+
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.cells.set_eye(eye_ws);
-        self.frame = 0;
+        self.schedule.restart();
     }
 
     #[inline]
@@ -208,16 +188,15 @@ impl LightSampler for AdaptiveSampler {
         probability(own) + self.table_pmf(local, light)
     }
 
-    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
-        self.frame = self.frame.saturating_add(1);
-        if self.frame > FIRST_FRAMES && !self.frame.is_multiple_of(LATER_STEP) {
-            return;
-        }
+    fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
         let start = Instant::now();
-        let logs = &*thinned(logs, self.frame);
+        let Some(logs) = self.schedule.end_frame(logs) else {
+            return;
+        };
+        let logs = &*logs;
         let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
-        rayon::join(|| table.end_frame(scene, logs), || cells.learn(prior.tree(), logs));
-        self.prior.end_frame(scene, logs);
+        rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), logs));
+        self.prior.learn(logs);
         self.learn_s += start.elapsed().as_secs_f64();
     }
 
