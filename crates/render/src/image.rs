@@ -8,7 +8,7 @@ use exr::prelude::{
 use glam::Vec3;
 use image::ImageEncoder;
 use scene::luminance;
-use std::io::{BufReader, BufWriter, Write};
+use std::io::{BufReader, Cursor};
 use std::path::Path;
 
 mod display;
@@ -33,7 +33,7 @@ impl Channel {
     }
 }
 
-/// Writes a float32 scanline EXR (ZIP) with `channels` and text attributes `metadata`; beside the target first, then renamed.
+/// Writes a float32 scanline EXR (ZIP) with `channels` and text attributes `metadata`, see [`scene::file::write`].
 /// Characters that EXR text cannot hold (beyond Latin-1) become '?'.
 ///
 /// # Errors
@@ -78,15 +78,15 @@ pub fn write_exr(
         encoding,
         AnyChannels::sort(list.collect::<SmallVec<[_; 4]>>()),
     );
-    write_beside(path, |file| {
-        let image = exr::image::Image::from_layer(layer);
-        // The writer seeks back to its offset table, which a BufWriter allows.
-        image
-            .write()
-            .non_parallel()
-            .to_buffered(BufWriter::new(file))
-            .map_err(|e| e.to_string())
-    })
+    // The writer seeks back to its offset table, which pipes do not allow: the file is made in memory.
+    let mut bytes = Cursor::new(Vec::new());
+    let image = exr::image::Image::from_layer(layer);
+    image
+        .write()
+        .non_parallel()
+        .to_buffered(&mut bytes)
+        .map_err(|e| write_error(path, e.to_string()))?;
+    write_file(path, &bytes.into_inner())
 }
 
 /// Reads the R, G, B channels of an EXR (or Y alone as grey), half or float; everything else in the file is ignored.
@@ -135,7 +135,7 @@ pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
     )))
 }
 
-/// Writes an sRGB PNG of `image` x 2^`exposure` through the display tone curve; beside the target first, then renamed.
+/// Writes an sRGB PNG of `image` x 2^`exposure` through the display tone curve, see [`scene::file::write`].
 ///
 /// # Errors
 /// [`RenderError::Write`].
@@ -144,7 +144,7 @@ pub fn write_png(path: &Path, image: &Image, exposure: f32) -> Result<(), Render
     write_pixels(path, image, |pixel| display::tone_mapped(pixel * scale))
 }
 
-/// Writes an sRGB PNG of values in \[0, 1\] without a tone curve: for false colours. Beside the target first, then renamed.
+/// Writes an sRGB PNG of values in \[0, 1\] without a tone curve: for false colours, see [`scene::file::write`].
 ///
 /// # Errors
 /// [`RenderError::Write`].
@@ -173,40 +173,17 @@ pub fn auto_exposure(image: &Image) -> f32 {
 }
 
 fn write_pixels(path: &Path, image: &Image, encode: impl Fn(Vec3) -> [u8; 3]) -> Result<(), RenderError> {
-    let bytes: Vec<u8> = image.pixels.iter().flat_map(|p| encode(Vec3::from(*p))).collect();
-    write_beside(path, |file| {
-        let mut out = BufWriter::new(file);
-        let encoder = image::codecs::png::PngEncoder::new(&mut out);
-        encoder
-            .write_image(&bytes, image.width, image.height, image::ExtendedColorType::Rgb8)
-            .map_err(|e| e.to_string())?;
-        out.flush().map_err(|e| e.to_string())
-    })
+    let pixels: Vec<u8> = image.pixels.iter().flat_map(|p| encode(Vec3::from(*p))).collect();
+    let mut bytes = Vec::new();
+    image::codecs::png::PngEncoder::new(&mut bytes)
+        .write_image(&pixels, image.width, image.height, image::ExtendedColorType::Rgb8)
+        .map_err(|e| write_error(path, e.to_string()))?;
+    write_file(path, &bytes)
 }
 
-/// Writes to a temporary file in the target's folder and renames it: readers see the whole file or the old one, and a
-/// failure leaves nothing behind.
-fn write_beside(path: &Path, write: impl FnOnce(&mut std::fs::File) -> Result<(), String>) -> Result<(), RenderError> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if path.is_dir() {
-        return Err(write_error(path, "it is a folder"));
-    }
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    {
-        // What an ordinary new file gets, less the umask; temporary files would be readable by their owner only.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let mut file = builder
-        .tempfile_in(folder)
-        .map_err(|e| write_error(path, e.to_string()))?;
-    write(file.as_file_mut()).map_err(|reason| write_error(path, reason))?;
-    file.persist(path).map_err(|e| write_error(path, e.error.to_string()))?;
-    Ok(())
+/// Writes a whole image file, see [`scene::file::write`].
+fn write_file(path: &Path, bytes: &[u8]) -> Result<(), RenderError> {
+    scene::file::write(path, |file| file.write_all(bytes)).map_err(|e| write_error(path, e.to_string()))
 }
 
 fn write_error(path: &Path, reason: impl Into<String>) -> RenderError {

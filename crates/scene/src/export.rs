@@ -7,13 +7,13 @@ mod document;
 mod geometry;
 mod material;
 
-use crate::{LightKind, SceneError, SceneParts};
+use crate::{LightKind, SceneError, SceneParts, file};
 use document::{BufferView, Document, LightIndex, Node, NodeExtensions};
 use geometry::{Geometry, Packed};
 use glam::{Affine3A, Quat, Vec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter, Write};
+use std::io;
 use std::path::Path;
 
 const EXTENSIONS: [&str; 5] = [
@@ -24,7 +24,7 @@ const EXTENSIONS: [&str; 5] = [
     "KHR_texture_transform",
 ];
 
-/// Writes `parts` as one `.glb` (beside the target first, then renamed).
+/// Writes `parts` as one `.glb`, see [`file::write`].
 ///
 /// The parts must be valid, as those of a [`crate::Scene`] and of [`crate::generate::demo`] are.
 ///
@@ -85,7 +85,7 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
     let length =
         u32::try_from(length).map_err(|_| io::Error::new(io::ErrorKind::FileTooLarge, "a .glb holds at most 4 GiB"))?;
     let chunk = |kind: &[u8; 4], bytes: &[u8]| [&(bytes.len() as u32).to_le_bytes(), kind.as_slice()].concat();
-    save(path, |file| {
+    file::write(path, |file| {
         file.write_all(b"glTF")?;
         file.write_all(&2u32.to_le_bytes())?;
         file.write_all(&length.to_le_bytes())?;
@@ -99,28 +99,6 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
 /// Fills up to a multiple of four bytes, as chunks and buffer views of f32 must start.
 fn pad(bytes: &mut Vec<u8>, with: u8) {
     bytes.resize(bytes.len().next_multiple_of(4), with);
-}
-
-/// Writes a temporary file beside `path` and renames it, so that nobody ever sees half of it.
-fn save(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".manylight-").suffix(".glb");
-    #[cfg(unix)]
-    {
-        // As any other new file, not private as temporary ones are; the process' umask still applies.
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    let file = builder.tempfile_in(folder)?;
-    let mut writer = BufWriter::new(file);
-    fill(&mut writer)?;
-    let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
-    file.persist(path)?;
-    Ok(())
 }
 
 fn cameras<'a>(parts: &'a SceneParts, document: &mut Document<'a>) {

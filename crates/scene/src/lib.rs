@@ -4,7 +4,7 @@
 //! validates it, finds the lights and builds the acceleration structure; after that a scene never changes.
 //!
 //! Absent from this crate: GPU, random state (samples take their `u` as an argument), windows. Files are read in
-//! [`gltf`] and written in [`export`] only. After [`Scene::new`] has succeeded every index is in range, every normal
+//! [`gltf`] and made in [`export`] only, by way of [`file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
 pub mod bsdf;
@@ -12,6 +12,7 @@ pub mod bvh;
 pub mod camera;
 pub mod error;
 pub mod export;
+pub mod file;
 pub mod generate;
 pub mod gltf;
 mod inputs;
