@@ -37,15 +37,15 @@ impl Brightness {
         }
     }
 
-    fn cell(&self, point: &ShadingPoint) -> usize {
+    fn cell(&self, point: &ShadingPoint) -> u16 {
         let at = (point.position_ws * self.cells_per_metre).floor().as_ivec3();
         let facing = point.normal_ws.abs().max_position() as u32;
         let side = facing * 2 + u32::from(point.normal_ws[facing as usize] > 0.0);
-        hash3(at.x as u32, at.y as u32, (at.z as u32).wrapping_mul(8) + side) as usize % CELLS
+        hash3(at.x as u32, at.y as u32, (at.z as u32).wrapping_mul(8) + side) as u16 % CELLS as u16
     }
 
-    /// Takes note of an estimate.
-    pub(crate) fn observe(&mut self, observation: &Observation) {
+    /// Takes note of an estimate; returns the cell that the point is in, for [`Brightness::of_cell`].
+    pub(crate) fn observe(&mut self, observation: &Observation) -> u16 {
         let mean = self.mean();
         let estimate = if observation.visible {
             observation.unshadowed / observation.pmf.max(f32::MIN_POSITIVE)
@@ -58,20 +58,22 @@ impl Brightness {
             estimate
         };
         let cell = self.cell(&observation.point);
-        self.cells[cell].0 += estimate;
-        self.cells[cell].1 += 1.0;
+        let (sum, count) = &mut self.cells[usize::from(cell)];
+        *sum += estimate;
+        *count += 1.0;
         self.sum += f64::from(estimate);
         self.count += 1.0;
+        cell
     }
 
     fn mean(&self) -> f32 {
         (self.sum / self.count.max(1.0)) as f32
     }
 
-    /// Brightness around `point`, above 0 as soon as any light has been seen.
-    pub(crate) fn at(&self, point: &ShadingPoint) -> f32 {
+    /// Brightness of a cell, above 0 as soon as any light has been seen.
+    pub(crate) fn of_cell(&self, cell: u16) -> f32 {
         let mean = self.mean();
-        let (sum, count) = self.cells[self.cell(point)];
+        let (sum, count) = self.cells[usize::from(cell)];
         (sum + PRIOR_SAMPLES * mean) / (count + PRIOR_SAMPLES) + LEAST * mean
     }
 

@@ -4,8 +4,9 @@
 //! judged by that). Per light the table keeps the running maximum, decayed every frame, and the second moment: the least
 //! noisy distribution is proportional to its root (Rath et al. 2020, "Variance-Aware Path Guiding"). A light is drawn
 //! in proportion to that root, lifted by a share of the maximum so that a light that has just turned up is not forgotten
-//! again at once. Lights without samples are believed to be worth their power. Differs from Wald et al.: no separate
-//! estimation pass, every frame teaches the next.
+//! again at once. Lights without samples are believed to be worth their power, and lights that were sampled and not seen
+//! as much less as the lights seen just once say (Good 1953, "The population frequencies of species and the estimation
+//! of population parameters"). Differs from Wald et al.: no separate estimation pass, every frame teaches the next.
 
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;
@@ -16,8 +17,9 @@ use sampling::Discrete;
 use scene::{Light, Scene};
 use std::time::Instant;
 
-/// Samples' worth of trust in the prior, the light's power: higher values follow power longer.
-const PRIOR_SAMPLES: f64 = 4.0;
+/// Most samples' worth of trust in the prior, the light's power; how many it is worth is learned. Higher values follow
+/// power longer where many lights are seen by few pixels.
+const MAX_PRIOR_SAMPLES: f64 = 4.0;
 /// Share of the running maximum in a light's weight. Higher values follow a light that has just turned up sooner, and let a
 /// few strong samples own the table: on a building of 2,000 lights 0.1 costs twice the error of 0.
 const MAX_SHARE: f64 = 0.01;
@@ -36,6 +38,8 @@ pub struct TableSampler {
     secondary: Option<Table>,
     prior: Vec<f64>,
     brightness: Brightness,
+    /// Cell of each observation of the frame that is learned from; kept for its memory only.
+    cells: Vec<u16>,
     settings: Settings,
     /// Which frames are learned from.
     schedule: Schedule,
@@ -49,6 +53,8 @@ pub struct TableSampler {
 #[derive(Clone, Copy, Debug, Default)]
 struct Entry {
     samples: f64,
+    /// How many of them saw it.
+    sightings: u32,
     /// Sum of squared visible contributions.
     sum_sq: f64,
     /// Running maximum at the time of `frame`.
@@ -84,6 +90,7 @@ impl TableSampler {
             secondary: None,
             prior,
             brightness: Brightness::new(radius),
+            cells: Vec::new(),
             settings: settings.clone(),
             schedule: Schedule::default(),
             frame: 0,
@@ -103,14 +110,17 @@ impl TableSampler {
     pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
         let start = Instant::now();
         self.frame += 1;
-        if self.secondary.is_none() && logs.iter().flatten().any(|o| !o.point.primary) {
+        let mut later_hits = false;
+        self.cells.clear();
+        for observation in logs.iter().flatten() {
+            later_hits |= !observation.point.primary;
+            self.cells.push(self.brightness.observe(observation));
+        }
+        if later_hits && self.secondary.is_none() {
             self.secondary = Some(Table::new(&self.prior, f64::from(self.settings.min_probability_mass)));
         }
-        for observation in logs.iter().flatten() {
-            self.brightness.observe(observation);
-        }
-        for observation in logs.iter().flatten() {
-            let brightness = self.brightness.at(&observation.point);
+        for (observation, &cell) in logs.iter().flatten().zip(&self.cells) {
+            let brightness = self.brightness.of_cell(cell);
             let table = match &mut self.secondary {
                 Some(secondary) if !observation.point.primary => secondary,
                 _ => &mut self.primary,
@@ -152,8 +162,12 @@ impl Table {
         }
         let contribution = (observation.unshadowed / brightness.max(f32::MIN_POSITIVE)).min(entry.spike);
         entry.sum_sq += f64::from(contribution) * f64::from(contribution);
-        entry.max = decayed(entry.max, decay, frame - entry.frame).max(contribution);
-        entry.frame = frame;
+        entry.sightings = entry.sightings.saturating_add(1);
+        if entry.frame != frame {
+            entry.max = decayed(entry.max, decay, frame - entry.frame);
+            entry.frame = frame;
+        }
+        entry.max = entry.max.max(contribution);
     }
 
     /// Makes the distribution anew if enough has been observed to pay for the pass over all lights.
@@ -166,6 +180,7 @@ impl Table {
         };
         self.fresh = 0;
         let scale_sq = scale_sq(&self.entries, prior);
+        let prior_samples = prior_samples(&self.entries);
         self.weights.clear();
         for (entry, prior) in self.entries.iter_mut().zip(prior) {
             if entry.samples > MEMORY {
@@ -178,7 +193,7 @@ impl Table {
             } else {
                 f64::from(chance_visible(entry.samples as f32))
             };
-            let mean_sq = (entry.sum_sq + PRIOR_SAMPLES * expected_sq) * alive / (entry.samples + PRIOR_SAMPLES);
+            let mean_sq = (entry.sum_sq + prior_samples * expected_sq) * alive / (entry.samples + prior_samples);
             let max = MAX_SHARE * f64::from(decayed(entry.max, settings.table_decay, frame - entry.frame));
             let weight = (mean_sq + max * max).sqrt();
             entry.spike = (SPIKE * weight.max(expected_sq.sqrt())) as f32;
@@ -217,6 +232,21 @@ fn scale_sq(entries: &[Entry], prior: &[f64]) -> f64 {
         }
     }
     if sum > 0.0 { sum / count } else { 1.0 }
+}
+
+/// Samples' worth of trust in the prior: how many lights were seen once for each that was sampled and not seen. By that
+/// much, divided by its samples, a light not seen so far is expected to show at its next sample (Good 1953, equation 2,
+/// for lights sampled alike).
+fn prior_samples(entries: &[Entry]) -> f64 {
+    let (mut once, mut never) = (1.0, 1.0);
+    for entry in entries.iter().filter(|entry| entry.samples > 0.0) {
+        match entry.sightings {
+            0 => never += 1.0,
+            1 => once += 1.0,
+            _ => {}
+        }
+    }
+    f64::min(once / never, MAX_PRIOR_SAMPLES)
 }
 
 /// Sets the weights of known lights below `share` of the mean to zero, and gives all others the floor.
@@ -396,8 +426,26 @@ mod tests {
     }
 
     #[test]
+    fn trust_in_the_prior_follows_the_lights_seen_once() {
+        let entry = |samples, sightings| Entry {
+            samples,
+            sightings,
+            ..Entry::default()
+        };
+        let of = |once: usize, never: usize| {
+            let unsampled = vec![entry(0.0, 0); 1000];
+            let often = vec![entry(50.0, 9); 50];
+            prior_samples(&[vec![entry(9.0, 1); once], vec![entry(9.0, 0); never], unsampled, often].concat())
+        };
+        assert_eq!(of(0, 0), 1.0);
+        assert!(of(0, 999) < 0.002);
+        assert_eq!(of(199, 399), 0.5);
+        assert_eq!(of(500, 10), MAX_PRIOR_SAMPLES);
+    }
+
+    #[test]
     fn ignoring_is_off_until_asked_for_and_says_so() {
-        let lights = (0..100).map(|i| point(glam::Vec3::splat(0.1 * i as f32), 1.0));
+        let lights = (0..40).map(|i| point(glam::Vec3::splat(0.1 * i as f32), 1.0));
         let scene = scene_of(lights.collect());
         let visible = |light: u32| light.is_multiple_of(2);
         let plain = taught(&scene, &Settings::default(), 8, visible);

@@ -19,7 +19,7 @@ const SPIKE: f32 = 4.0;
 /// Least prior: evidence of a group is also evidence of the groups around it, and to count it at every level would make a dark corner
 /// of the tree darker with every level. Higher values keep lights that are rarely visible; lower values spend less on
 /// hidden ones.
-const MIN_PRIOR: f32 = 0.01;
+const MIN_PRIOR: f32 = 0.001;
 /// No share is believed to be smaller: keeps sums over a tree within the range of `f32`.
 const MIN_VISIBLE: f32 = 1e-9;
 
