@@ -116,6 +116,38 @@ pub struct LightRecord {
     pub min_probability: f64,
 }
 
+/// One entry of what a cell has learned: a light, or a cluster of lights that are drawn together. A row of
+/// `dump --cells`; field names are column names.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct CellRecord {
+    /// Number of the cell.
+    pub cell: u64,
+    /// Centre of the cell, world space.
+    pub x_m: f32,
+    /// See `x_m`.
+    pub y_m: f32,
+    /// See `x_m`.
+    pub z_m: f32,
+    /// Edge of the cell.
+    pub size_m: f32,
+    /// Where the normals in the cell point: "+x", "-x", "+y", "-y", "+z" or "-z".
+    pub normal: &'static str,
+    /// First hits of eye paths, or later ones.
+    pub primary: bool,
+    /// The light, or the cluster's first one.
+    pub light: u32,
+    /// Lights in the cluster; 1 for a light of its own.
+    pub lights: u32,
+    /// With which the entry is drawn in the cell, what is shared by all lights included as far as the cell knows it.
+    pub probability: f64,
+    /// Visible share of the contributions observed in the cell; `None` if never observed.
+    pub visible_fraction: Option<f64>,
+    /// Observations the entry rests on.
+    pub samples: u64,
+    /// Frames since the cell was made.
+    pub age: u64,
+}
+
 /// Chooses lights.
 ///
 /// The associated type [`LightSampler::Local`] holds what is worked out once per shading point and used by every
@@ -139,6 +171,10 @@ pub trait LightSampler: Debug + Send + Sync {
     /// Tells where the eye is, before the first frame and when it has moved: samplers that keep cells make them finer
     /// near it.
     fn set_eye(&mut self, _eye_ws: Vec3) {}
+
+    /// Tells that the scene has changed since the last frame: its lights are the same in number and order, but some may
+    /// shine otherwise, and surfaces may have come, gone or moved.
+    fn scene_changed(&mut self, _scene: &Scene) {}
 
     /// Prepares for `point`.
     fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_>;
@@ -165,4 +201,9 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// What it knows about each light, in the order of [`Scene::lights`].
     fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+
+    /// What it has learned in each cell; none for samplers without cells.
+    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
+        Vec::new()
+    }
 }

@@ -1,6 +1,6 @@
 //! What `dump` writes about each light, and a wrapper that gathers it around any sampler.
 
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
 use glam::Vec3;
 use sampling::hemisphere::uniform_sphere;
 use sampling::{Random, unit_f32};
@@ -128,6 +128,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.set_eye(eye_ws);
     }
 
+    fn scene_changed(&mut self, scene: &Scene) {
+        self.inner.scene_changed(scene);
+    }
+
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
         self.inner.end_frame(scene, logs);
         self.frame += 1;
@@ -159,6 +163,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
 
     fn stats(&self) -> SamplerStats {
         self.inner.stats()
+    }
+
+    fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
+        self.inner.cells(scene)
     }
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {

@@ -83,8 +83,8 @@ impl LightSampler for UniformSampler {
             bytes: size_of::<Self>(),
             min_probability: f64::from(self.pmf_rest),
             skipped: match self.count {
-                0 => vec!["no lights: nothing to choose".into()],
-                1 => vec!["one light: nothing to choose or to learn".into()],
+                0 => vec!["no lights: no light sampling, no bounces".into()],
+                1 => vec!["one light: nothing to choose, nothing to learn".into()],
                 _ => Vec::new(),
             },
             ..SamplerStats::default()
