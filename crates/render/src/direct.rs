@@ -3,7 +3,7 @@
 use crate::path::{Probe, TileLog};
 use glam::{Vec2, Vec3};
 use light_cache::{LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
-use sampling::{VertexSequence, mis};
+use sampling::{VertexSequence, mis, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 
 /// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
@@ -18,6 +18,26 @@ pub(crate) struct Vertex<'v> {
     pub(crate) point: ShadingPoint,
     /// Whether a direction drawn from the BSDF will also look for lights, so that both must share.
     pub(crate) competes: bool,
+}
+
+/// The random numbers of direct light at a vertex, 32 bits each.
+#[derive(Clone, Copy)]
+pub(crate) struct LightNumbers {
+    /// Chooses the light.
+    pub(crate) choice: u32,
+    /// Choose the point on it.
+    pub(crate) point: [u32; 2],
+}
+
+impl LightNumbers {
+    /// The dimensions of a vertex that are meant for it.
+    #[inline]
+    pub(crate) fn new(numbers: &VertexSequence) -> Self {
+        Self {
+            choice: numbers.u32(2),
+            point: [numbers.u32(3), numbers.u32(4)],
+        }
+    }
 }
 
 /// An estimate of direct light.
@@ -44,7 +64,7 @@ pub(crate) trait DirectLight: Sync + Send {
         scene: &Scene,
         local: &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: &VertexSequence,
+        numbers: LightNumbers,
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct;
@@ -85,17 +105,18 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         scene: &Scene,
         local: &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: &VertexSequence,
+        numbers: LightNumbers,
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
-        let Some(choice) = self.0.sample(local, numbers.u32(2)) else {
+        let Some(choice) = self.0.sample(local, numbers.choice) else {
             return Direct {
                 radiance: Vec3::ZERO,
                 light: None,
             };
         };
-        let connection = Connection::new(scene, vertex, choice.light, choice.pmf, numbers.vec2(3));
+        let on_light = Vec2::from(numbers.point.map(unit_f32));
+        let connection = Connection::new(scene, vertex, choice.light, choice.pmf, on_light);
         let visible = connection
             .as_ref()
             .is_some_and(|c| c.is_visible(scene, vertex, log, probe));

@@ -1,11 +1,11 @@
 //! Direct light at a path vertex from all lights: the judge of everything that chooses.
 
-use crate::direct::{Connection, Direct, DirectLight, Vertex};
+use crate::direct::{Connection, Direct, DirectLight, LightNumbers, Vertex};
 use crate::path::{Probe, TileLog};
 use glam::{DVec3, Vec2, Vec3};
 use light_cache::{LightRecord, Observation, SamplerStats, ShadingPoint};
 use sampling::hash::hash2;
-use sampling::{VertexSequence, unit_f32};
+use sampling::unit_f32;
 use scene::{Light, LightKind, Scene};
 
 /// Lights tested at a time: a few vector registers, one word of a bit mask.
@@ -115,13 +115,13 @@ impl DirectLight for AllLights {
         scene: &Scene,
         (): &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: &VertexSequence,
+        numbers: LightNumbers,
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
         // Each light gets the vertex's stratified point under a digital shift of its own (Kollig and Keller 2002,
         // section 3): as well stratified over the frames, and independent of the other lights.
-        let (u0, u1) = (numbers.u32(3), numbers.u32(4));
+        let [u0, u1] = numbers.point;
         // In f64: a million lights may add up here.
         let mut sum = DVec3::ZERO;
         let (p, n) = (vertex.surface.position_ws, vertex.surface.geometric_normal_ws);

@@ -1,8 +1,8 @@
 //! Progressive accumulation: compensated sums per pixel, kept tile by tile.
 //!
-//! A tile owns its pixels, so tiles are rendered in parallel without sharing, and a sample touches one cache line.
+//! A tile owns its pixels, so tiles are rendered in parallel without sharing, and a sample touches one cache line or two.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use sampling::sum::PairSum;
 use scene::luminance;
@@ -69,7 +69,7 @@ impl AovSample {
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelRecord {
     /// R, G, B, luminance squared.
-    sums: [PairSum; 4],
+    sums: PairSum<Vec4>,
     /// Samples in the sums: frames less those whose sample was not finite.
     count: u32,
 }
@@ -120,10 +120,7 @@ impl Tile {
         let y = luminance(radiance);
         let y_sq = (y * y).min(LARGEST);
         let pixel = &mut self.pixels[index];
-        pixel.sums[0].add(radiance.x);
-        pixel.sums[1].add(radiance.y);
-        pixel.sums[2].add(radiance.z);
-        pixel.sums[3].add(y_sq);
+        pixel.sums.add(radiance.extend(y_sq));
         pixel.count += 1;
         true
     }
@@ -212,7 +209,8 @@ impl Film {
         self.to_image(|tile, i| {
             let pixel = &tile.pixels[i];
             let scale = 1.0 / f64::from(pixel.count.max(1));
-            [0, 1, 2].map(|c| (pixel.sums[c].value() * scale) as f32)
+            let [r, g, b, _] = pixel.sums.values();
+            [r, g, b].map(|sum| (sum * scale) as f32)
         })
     }
 
@@ -225,10 +223,10 @@ impl Film {
                 return 0.0;
             }
             let n = f64::from(pixel.count);
-            let [r, g, b] = [0, 1, 2].map(|c| pixel.sums[c].value() / n);
+            let [r, g, b, y_sq] = pixel.sums.values().map(|sum| sum / n);
             let mean = 0.2126 * r + 0.7152 * g + 0.0722 * b;
             // Rounding may take the difference of two nearly equal squares below zero.
-            ((pixel.sums[3].value() / n - mean * mean) / (n - 1.0)).max(0.0) as f32
+            ((y_sq - mean * mean) / (n - 1.0)).max(0.0) as f32
         })
     }
 

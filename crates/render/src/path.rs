@@ -1,14 +1,17 @@
 //! The frame, from the tile down to the last bounce of a path: read it from top to bottom.
 
-use crate::direct::{DirectLight, Vertex};
-use crate::film::{AovSample, TILE_SIZE, Tile};
+use crate::direct::{DirectLight, LightNumbers, Vertex};
+use crate::film::{AovSample, Tile};
 use crate::filter::FilterSampler;
 use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
-use sampling::{PixelSequence, mis};
+use sampling::{PixelSequence, first_vertices, mis, unit_f32};
+#[cfg(target_arch = "x86_64")]
+use scene::bvh::Kernel;
+use scene::bvh::{PACKET, Packet};
 use scene::camera::CameraRays;
 use scene::surface::NO_LIGHT;
-use scene::{Bsdf, PrimitiveId, Ray, Scene, Surface};
+use scene::{Bsdf, Hit, PrimitiveId, Ray, Scene, Surface};
 
 /// Above this GGX alpha the BSDF's directions find lights so seldom that the last vertex of a path does not try: light
 /// sampling alone does as well there. Higher values trace more rays; lower values leave noise in reflections of lamps.
@@ -86,50 +89,142 @@ impl Probe for AovSample {
 }
 
 /// One sample for every pixel of a tile. With `AOVS` the auxiliary images too.
+#[allow(unsafe_code, reason = "vector instructions")]
 pub(crate) fn render_tile<D: DirectLight, const AOVS: bool>(
     view: &FrameView<'_, D>,
     tile: &mut Tile,
     log: &mut TileLog<'_>,
 ) {
+    #[cfg(target_arch = "x86_64")]
+    if view.scene.bvh().kernel() != Kernel::Portable {
+        // SAFETY: the kernels other than the portable one need these instructions too, and the processor has those of
+        // the kernel in use.
+        return unsafe { render_tile_avx2::<D, AOVS>(view, tile, log) };
+    }
+    render_rows::<D, AOVS>(view, tile, log);
+}
+
+/// [`render_rows`] with wider vectors.
+#[cfg(target_arch = "x86_64")]
+#[allow(unsafe_code, reason = "vector instructions")]
+#[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
+unsafe fn render_tile_avx2<D: DirectLight, const AOVS: bool>(
+    view: &FrameView<'_, D>,
+    tile: &mut Tile,
+    log: &mut TileLog<'_>,
+) {
+    render_rows::<D, AOVS>(view, tile, log);
+}
+
+#[inline(always)]
+fn render_rows<D: DirectLight, const AOVS: bool>(view: &FrameView<'_, D>, tile: &mut Tile, log: &mut TileLog<'_>) {
     for row in 0..tile.height {
-        // The eye rays of a row first: one after the other they keep the processor busier than between long paths.
-        let starts: [Start; TILE_SIZE as usize] =
-            std::array::from_fn(|column| Start::new(view, tile.x0 + column as u32, tile.y0 + row));
-        for (column, start) in starts[..tile.width as usize].iter().enumerate() {
-            let index = row as usize * tile.width as usize + column;
-            let radiance = if AOVS {
-                let mut aovs = AovSample::NONE;
-                let radiance = path(view, start, log, &mut aovs);
-                tile.add_aovs(index, &aovs);
-                radiance
-            } else {
-                path(view, start, log, &mut ())
-            };
-            if !tile.add(index, radiance) {
-                log.counters.nonfinite += 1;
+        for column in (0..tile.width).step_by(PACKET) {
+            let starts = Starts::new(view, tile.x0 + column, tile.y0 + row);
+            for i in 0..PACKET.min((tile.width - column) as usize) {
+                let start = starts.get(i);
+                let index = (row * tile.width + column) as usize + i;
+                let radiance = if AOVS {
+                    let mut aovs = AovSample::NONE;
+                    let radiance = path(view, &start, log, &mut aovs);
+                    tile.add_aovs(index, &aovs);
+                    radiance
+                } else {
+                    path(view, &start, log, &mut ())
+                };
+                if !tile.add(index, radiance) {
+                    log.counters.nonfinite += 1;
+                }
             }
         }
     }
 }
 
+/// Where the paths of neighbouring pixels begin: everything up to the first hit is done for all of them at once.
+pub(crate) struct Starts {
+    first_pixel: u32,
+    rays: Packet,
+    hits: [Option<Hit>; PACKET],
+    /// By dimension: for the position in the pixel, the choice of a light, the point on it.
+    numbers: [[u32; PACKET]; 5],
+}
+
 /// Where a path begins.
 pub(crate) struct Start {
-    sequence: PixelSequence,
+    pixel: u32,
     direction_ws: Vec3,
+    hit: Option<Hit>,
+    light_numbers: LightNumbers,
+}
+
+impl Starts {
+    /// In the pixels of row `y` from column `x` on. Those beyond the image's edge are of no use, and harmless.
+    #[inline(always)]
+    pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
+        let first_pixel = y * view.image_width + x;
+        let numbers: [[u32; PACKET]; 5] = first_vertices(view.seed, first_pixel, view.frame);
+        let mut rays = Packet {
+            origin_ws: view.camera.origin_ws,
+            directions_ws: [[0.0; PACKET]; 3],
+        };
+        for i in 0..PACKET {
+            let direction_ws = eye_direction_ws(view, x + i as u32, y, [numbers[0][i], numbers[1][i]]).to_array();
+            for axis in 0..3 {
+                rays.directions_ws[axis][i] = direction_ws[axis];
+            }
+        }
+        Self {
+            first_pixel,
+            hits: view.scene.nearest_of_packet(&rays),
+            rays,
+            numbers,
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn get(&self, i: usize) -> Start {
+        let [_, _, choice, point @ ..] = &self.numbers;
+        Start {
+            pixel: self.first_pixel + i as u32,
+            direction_ws: self.rays.direction_ws(i),
+            hit: self.hits[i],
+            light_numbers: LightNumbers {
+                choice: choice[i],
+                point: [point[0][i], point[1][i]],
+            },
+        }
+    }
 }
 
 impl Start {
-    /// In the pixel of column `x` and row `y`.
-    #[inline(always)]
+    /// In one pixel, without its neighbours.
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
-        let sequence = PixelSequence::new(view.seed, y * view.image_width + x, view.frame);
-        let pixel = Vec2::new(x as f32, y as f32);
-        let offset = view.filter.offset(sequence.vertex(0).vec2(0));
+        let pixel = y * view.image_width + x;
+        let [[u], [v], [choice], [on_light_0], [on_light_1]] = first_vertices(view.seed, pixel, view.frame);
+        let direction_ws = eye_direction_ws(view, x, y, [u, v]);
+        let ray = Ray {
+            origin_ws: view.camera.origin_ws,
+            direction_ws,
+            t_max: f32::INFINITY,
+        };
         Self {
-            sequence,
-            direction_ws: view.camera.direction_ws(pixel + offset),
+            pixel,
+            direction_ws,
+            hit: view.scene.nearest(&ray, PrimitiveId::NONE),
+            light_numbers: LightNumbers {
+                choice,
+                point: [on_light_0, on_light_1],
+            },
         }
     }
+}
+
+/// The direction of the eye ray through the pixel in column `x` and row `y`, `u` being 32 bits each.
+#[inline(always)]
+fn eye_direction_ws<D>(view: &FrameView<'_, D>, x: u32, y: u32, u: [u32; 2]) -> Vec3 {
+    let corner = Vec2::new(x as f32, y as f32);
+    let offset = view.filter.offset(Vec2::new(unit_f32(u[0]), unit_f32(u[1])));
+    view.camera.direction_ws(corner + offset)
 }
 
 /// The radiance that one path brings back.
@@ -141,22 +236,21 @@ pub(crate) fn path<D: DirectLight>(
     probe: &mut impl Probe,
 ) -> Vec3 {
     let scene = view.scene;
-    let mut numbers = start.sequence.vertex(0);
     let mut ray = Ray {
         origin_ws: view.camera.origin_ws,
         direction_ws: start.direction_ws,
         t_max: f32::INFINITY,
     };
+    // The eye ray has been traced with its neighbours.
+    log.counters.rays_nearest += 1;
+    probe.nearest(&ray, PrimitiveId::NONE);
+    let mut found = start.hit;
+    let mut light_numbers = start.light_numbers;
     let mut left: Option<Departure<D::Local<'_>>> = None;
     let mut radiance = Vec3::ZERO;
     let mut throughput = Vec3::ONE;
     let mut bounce = 0;
-    loop {
-        // The nearest surface.
-        let from = left.as_ref().map_or(PrimitiveId::NONE, |l| l.id);
-        log.counters.rays_nearest += 1;
-        probe.nearest(&ray, from);
-        let Some(hit) = scene.nearest(&ray, from) else { break };
+    while let Some(hit) = found {
         let surface = scene.surface(&ray, &hit);
 
         // Its emission, weighed against the chance that light sampling at the vertex before had found it.
@@ -191,7 +285,7 @@ pub(crate) fn path<D: DirectLight>(
             point,
             competes: continues && view.area_lights,
         };
-        let direct = view.direct.estimate(scene, &local, &vertex, &numbers, log, probe);
+        let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
         radiance += direct.radiance;
         if bounce == 0 {
             probe.first_hit(&surface, hit.t, direct.light);
@@ -201,6 +295,8 @@ pub(crate) fn path<D: DirectLight>(
         }
 
         // Russian roulette on the largest component: luminance would kill saturated blues with large weights.
+        let sequence = PixelSequence::new(view.seed, start.pixel, view.frame);
+        let numbers = sequence.vertex(bounce);
         let survival = throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
         let u = numbers.f32(5);
         if u >= survival {
@@ -219,11 +315,15 @@ pub(crate) fn path<D: DirectLight>(
         left = Some(Departure {
             local,
             position_ws: surface.position_ws,
-            id: surface.id,
             pdf_solid_angle: sample.pdf_solid_angle,
         });
         bounce += 1;
-        numbers = start.sequence.vertex(bounce);
+        light_numbers = LightNumbers::new(&sequence.vertex(bounce));
+
+        // The nearest surface.
+        log.counters.rays_nearest += 1;
+        probe.nearest(&ray, surface.id);
+        found = scene.nearest(&ray, surface.id);
     }
     radiance
 }
@@ -232,7 +332,6 @@ pub(crate) fn path<D: DirectLight>(
 struct Departure<L> {
     local: L,
     position_ws: Vec3,
-    id: PrimitiveId,
     /// Density with which the BSDF drew the direction.
     pdf_solid_angle: f32,
 }

@@ -3,8 +3,9 @@
 use crate::Settings;
 use crate::direct::OneLight;
 use crate::filter::FilterSampler;
-use crate::path::{Counters, FrameView, Probe, Start, TileLog, path};
+use crate::path::{Counters, FrameView, Probe, Starts, TileLog, path};
 use light_cache::UniformSampler;
+use scene::bvh::PACKET;
 use scene::{Camera, PrimitiveId, Ray, Scene};
 
 /// Rays in the order in which a rendering traces them.
@@ -47,8 +48,11 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
     };
     for tile in film.tiles_mut() {
         for y in tile.y0..tile.y0 + tile.height {
-            for x in tile.x0..tile.x0 + tile.width {
-                path(&view, &Start::new(&view, x, y), &mut log, &mut rays);
+            for column in (0..tile.width).step_by(PACKET) {
+                let starts = Starts::new(&view, tile.x0 + column, y);
+                for i in 0..PACKET.min((tile.width - column) as usize) {
+                    path(&view, &starts.get(i), &mut log, &mut rays);
+                }
             }
         }
     }

@@ -23,7 +23,7 @@ pub use discrete::{Discrete, Draw};
 pub use hemisphere::Frame;
 pub use random::{Random, unit_f32};
 pub use rectangle::SphericalRectangle;
-pub use sequence::{PixelSequence, VertexSequence};
+pub use sequence::{PixelSequence, VertexSequence, first_vertices};
 pub use statistics::Moments;
 pub use sum::PairSum;
 pub use triangle::SphericalTriangle;

@@ -1,26 +1,31 @@
 //! Compensated sums.
 
-/// A sum kept as an unevaluated pair: 48 significant bits from two `f32`.
+use glam::Vec4;
+use std::ops::{Add, Sub};
+
+/// A sum kept as an unevaluated pair: 48 significant bits from two `f32`. Of `f32`, or of four of them side by side.
 ///
 /// A plain `f32` sum of ones stops at 2^24; this one is exact to 1e-13 of the total for millions of frames. The
 /// addition is Knuth's TwoSum (The Art of Computer Programming 2, section 4.2.2), renormalised each time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
-pub struct PairSum {
+pub struct PairSum<T = f32> {
     /// The sum rounded to `f32`.
-    pub hi: f32,
+    pub hi: T,
     /// What the rounding lost.
-    pub lo: f32,
+    pub lo: T,
 }
 
-impl PairSum {
+impl<T: Copy + Add<Output = T> + Sub<Output = T>> PairSum<T> {
     /// Adds `x`. A non-finite `x` makes the sum non-finite: filter before.
     #[inline]
-    pub fn add(&mut self, x: f32) {
+    pub fn add(&mut self, x: T) {
         let (sum, error) = two_sum(self.hi, x);
         (self.hi, self.lo) = two_sum(sum, error + self.lo);
     }
+}
 
+impl PairSum {
     /// The sum.
     #[inline]
     pub fn value(&self) -> f64 {
@@ -28,9 +33,16 @@ impl PairSum {
     }
 }
 
+impl PairSum<Vec4> {
+    /// The four sums.
+    pub fn values(&self) -> [f64; 4] {
+        (self.hi.as_dvec4() + self.lo.as_dvec4()).to_array()
+    }
+}
+
 /// The rounded sum and its exact error, whatever the order of magnitudes.
 #[inline]
-fn two_sum(a: f32, b: f32) -> (f32, f32) {
+fn two_sum<T: Copy + Add<Output = T> + Sub<Output = T>>(a: T, b: T) -> (T, T) {
     let sum = a + b;
     let b_part = sum - a;
     let a_part = sum - b_part;
@@ -58,9 +70,12 @@ mod tests {
         #[test]
         fn agrees_with_f64(terms in prop::collection::vec(0.0_f32..1e4, 1..2000)) {
             let mut sum = PairSum::default();
+            let mut four = PairSum::<Vec4>::default();
             for &x in &terms {
                 sum.add(x);
+                four.add(Vec4::new(0.0, x, 1.0, x));
             }
+            prop_assert_eq!(four.values(), [0.0, sum.value(), terms.len() as f64, sum.value()]);
             let expected: f64 = terms.iter().map(|&x| f64::from(x)).sum();
             prop_assert!((sum.value() - expected).abs() <= 1e-11 * expected);
         }

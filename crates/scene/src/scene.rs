@@ -1,6 +1,6 @@
 //! The validated whole.
 
-use crate::bvh::Bvh;
+use crate::bvh::{Bvh, PACKET, Packet};
 use crate::inputs::Inputs;
 use crate::light::collect::{Collected, collect};
 use crate::shading::Shading;
@@ -175,6 +175,12 @@ impl Scene {
     #[inline]
     pub fn nearest(&self, ray: &Ray, from: PrimitiveId) -> Option<Hit> {
         self.bvh.nearest(&self.parts, ray, from)
+    }
+
+    /// The nearest visible surface along each ray of `packet`.
+    #[inline]
+    pub fn nearest_of_packet(&self, packet: &Packet) -> [Option<Hit>; PACKET] {
+        self.bvh.nearest_of_packet(&self.parts, packet)
     }
 
     /// Whether anything but the triangles `from` and `to` stands on the ray.

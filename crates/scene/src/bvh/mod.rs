@@ -12,6 +12,7 @@ mod collapse;
 mod kernel;
 mod node;
 mod pack;
+mod packet;
 mod query;
 mod traverse;
 
@@ -24,6 +25,7 @@ use kernel::avx2::Avx2;
 use kernel::portable::Portable;
 use node::Node;
 use pack::Pack;
+pub use packet::{PACKET, Packet};
 use query::Query;
 
 /// A ray. `direction` is of unit length; hits count in (0, `t_max`).
@@ -179,6 +181,21 @@ impl Bvh {
         }
     }
 
+    /// The nearest hit of each ray of `packet`. Nothing is skipped.
+    #[allow(unsafe_code, reason = "vector instructions")]
+    pub fn nearest_of_packet(&self, parts: &SceneParts, packet: &Packet) -> [Option<Hit>; PACKET] {
+        // SAFETY: `kernel` is one that this processor has.
+        unsafe {
+            match self.kernel {
+                Kernel::Portable => portable::nearest_of_packet(self, parts, packet),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx2 => avx2::nearest_of_packet(self, parts, packet),
+                #[cfg(target_arch = "x86_64")]
+                Kernel::Avx512 => avx512::nearest_of_packet(self, parts, packet),
+            }
+        }
+    }
+
     /// Whether anything but `from` and `to` is hit.
     #[allow(unsafe_code, reason = "vector instructions")]
     pub fn occluded(&self, parts: &SceneParts, ray: &Ray, from: PrimitiveId, to: PrimitiveId) -> bool {
@@ -198,6 +215,12 @@ impl Bvh {
                 Kernel::Avx512 => avx512::occluded(&query),
             }
         }
+    }
+
+    /// The vector instructions in use: ones that this processor has.
+    #[inline]
+    pub fn kernel(&self) -> Kernel {
+        self.kernel
     }
 
     /// Uses `kernel` from now on, if this processor has it: for tests and measurements, [`Bvh::build`] takes the
@@ -251,6 +274,51 @@ macro_rules! compile {
                     unsafe { nearest_placed(query, &mut best) };
                 }
                 (best.id != PrimitiveId::NONE).then_some(best)
+            }
+
+            $(#[target_feature(enable = $features)])?
+            pub(super) unsafe fn nearest_of_packet(
+                bvh: &Bvh,
+                parts: &SceneParts,
+                packet: &Packet,
+            ) -> [Option<Hit>; PACKET] {
+                let mut best = [Hit {
+                    t: f32::INFINITY,
+                    u: 0.0,
+                    v: 0.0,
+                    id: PrimitiveId::NONE,
+                }; PACKET];
+                let alike = match bvh.fixed {
+                    // SAFETY: see above; `root` was made by `collapse`.
+                    Some(root) => unsafe { packet::nearest::<$instructions>(bvh, parts, root, packet, &mut best) },
+                    None => true,
+                };
+                let mut hits = [None; PACKET];
+                for i in 0..PACKET {
+                    let ray = Ray {
+                        origin_ws: packet.origin_ws,
+                        direction_ws: packet.direction_ws(i),
+                        t_max: f32::INFINITY,
+                    };
+                    let query = Query {
+                        bvh,
+                        parts,
+                        ray: &ray,
+                        skip: [PrimitiveId::NONE; 2],
+                    };
+                    // SAFETY: see above.
+                    unsafe {
+                        if !alike {
+                            hits[i] = nearest(&query);
+                            continue;
+                        }
+                        if bvh.top.is_some() {
+                            nearest_placed(&query, &mut best[i]);
+                        }
+                    }
+                    hits[i] = (best[i].id != PrimitiveId::NONE).then_some(best[i]);
+                }
+                hits
             }
 
             $(#[target_feature(enable = $features)])?

@@ -20,7 +20,7 @@ pub(super) struct Query<'a> {
 /// The triangles of one instance, for a query.
 struct InInstance<'a, I: Instructions> {
     query: &'a Query<'a>,
-    ray: I::Ray,
+    ray: &'a I::Ray,
     instance: u32,
     skip: [u32; 2],
     hits: PackHits,
@@ -106,8 +106,8 @@ impl<'a> Query<'a> {
         let t_max = best.t;
         // SAFETY: as the caller promises; `root` was made by `collapse`.
         unsafe {
-            let geometry = self.in_instance::<I>(instance, local);
-            let ray = geometry.ray;
+            let ray = I::ray(local);
+            let geometry = self.in_instance::<I>(instance, &ray);
             walk::<I, true>(&self.bvh.nodes, root, &ray, t_max, &mut Nearest { geometry, best });
         }
     }
@@ -116,8 +116,8 @@ impl<'a> Query<'a> {
     unsafe fn occluded_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay) -> bool {
         // SAFETY: as the caller promises; `root` was made by `collapse`.
         unsafe {
-            let geometry = self.in_instance::<I>(instance, local);
-            let ray = geometry.ray;
+            let ray = I::ray(local);
+            let geometry = self.in_instance::<I>(instance, &ray);
             let mut visitor = Any { geometry, found: false };
             walk::<I, false>(&self.bvh.nodes, root, &ray, self.ray.t_max, &mut visitor);
             visitor.found
@@ -125,11 +125,10 @@ impl<'a> Query<'a> {
     }
 
     #[inline(always)]
-    unsafe fn in_instance<I: Instructions>(&self, instance: u32, local: &LocalRay) -> InInstance<'_, I> {
+    fn in_instance<'q, I: Instructions>(&'q self, instance: u32, ray: &'q I::Ray) -> InInstance<'q, I> {
         InInstance {
             query: self,
-            // SAFETY: as the caller promises.
-            ray: unsafe { I::ray(local) },
+            ray,
             instance,
             skip: self
                 .skip
@@ -157,39 +156,42 @@ impl<I: Instructions> InInstance<'_, I> {
         // SAFETY: leaves of a mesh's tree are indices of packs; the rest as the caller promises.
         let (pack, mut mask) = unsafe {
             let pack = self.query.bvh.packs.get_unchecked(leaf as usize);
-            (pack, I::triangles(&self.ray, pack, t_max, &mut self.hits))
+            (pack, I::triangles(self.ray, pack, t_max, &mut self.hits))
         };
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize & 7;
             mask &= mask - 1;
-            if self.counts(pack.tag[lane], lane) && hit(&self.hits, lane, pack.tag[lane] & INDEX) {
+            let tag = pack.tag[lane];
+            if counts(self.query.parts, self.instance, self.skip, &self.hits, tag, lane)
+                && hit(&self.hits, lane, tag & INDEX)
+            {
                 return;
             }
         }
     }
+}
 
-    /// Whether a triangle that was hit is there: neither skipped, nor seen from a side that it lacks, nor cut out by its
-    /// texture.
-    #[inline(always)]
-    fn counts(&self, tag: u32, lane: usize) -> bool {
-        let triangle = tag & INDEX;
-        if triangle == self.skip[0] || triangle == self.skip[1] {
-            return false;
-        }
-        // In the space of the mesh, where a mirroring instance changes nothing: glTF 2.0 section 3.7.4 turns the
-        // winding round for those.
-        if tag & ONE_SIDED != 0 && self.hits.back >> lane & 1 != 0 {
-            return false;
-        }
-        tag & MASKED == 0
-            || alpha::visible(
-                self.query.parts,
-                self.instance,
-                triangle,
-                self.hits.u[lane],
-                self.hits.v[lane],
-            )
+/// Whether a triangle that was hit is there: neither skipped, nor seen from a side that it lacks, nor cut out by its
+/// texture.
+#[inline(always)]
+pub(super) fn counts(
+    parts: &SceneParts,
+    instance: u32,
+    skip: [u32; 2],
+    hits: &PackHits,
+    tag: u32,
+    lane: usize,
+) -> bool {
+    let triangle = tag & INDEX;
+    if triangle == skip[0] || triangle == skip[1] {
+        return false;
     }
+    // In the space of the mesh, where a mirroring instance changes nothing: glTF 2.0 section 3.7.4 turns the
+    // winding round for those.
+    if tag & ONE_SIDED != 0 && hits.back >> lane & 1 != 0 {
+        return false;
+    }
+    tag & MASKED == 0 || alpha::visible(parts, instance, triangle, hits.u[lane], hits.v[lane])
 }
 
 #[allow(unsafe_code, reason = "calls the kernels")]

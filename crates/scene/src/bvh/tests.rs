@@ -184,6 +184,117 @@ fn soups_agree_with_brute_force() {
     }
 }
 
+/// Whether each ray of a packet gets a hit that a single ray may get too: the same one, up to rounding at edges.
+fn check_packet(parts: &SceneParts, bvh: &Bvh, packet: &Packet, tolerance: f32) -> (u32, u32) {
+    let (mut met, mut differ) = (0, 0);
+    let hits = bvh.nearest_of_packet(parts, packet);
+    for (i, hit) in hits.iter().enumerate() {
+        let ray = Ray {
+            origin_ws: packet.origin_ws,
+            direction_ws: packet.direction_ws(i),
+            t_max: f32::INFINITY,
+        };
+        let alone = bvh.nearest(parts, &ray, PrimitiveId::NONE);
+        met += u32::from(alone.is_some());
+        let same = match (hit, alone) {
+            (Some(a), Some(b)) => {
+                a.id == b.id && (a.t - b.t).abs() <= tolerance * b.t && (a.u - b.u).abs() + (a.v - b.v).abs() < 1e-2
+            }
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        differ += u32::from(!same);
+    }
+    (met, differ)
+}
+
+#[test]
+fn packets_agree_with_single_rays() {
+    let mut numbers = Numbers(11);
+    let mut instanced = static_scene(&soup(&mut numbers, 300, 0.4));
+    instanced.meshes.push(mesh_of(&soup(&mut numbers, 50, 0.3)));
+    let turned = Affine3A::from_rotation_translation(Quat::from_rotation_x(1.0), Vec3::new(0.5, 0.0, -0.5));
+    instanced.instances.push(place(1, turned));
+    for parts in [static_scene(&soup(&mut numbers, 1000, 0.3)), instanced] {
+        let mut bvh = Bvh::build(&parts);
+        for kernel in Kernel::available() {
+            bvh.set_kernel(kernel);
+            let (mut met, mut differ) = (0, 0);
+            for i in 0..400 {
+                // From narrow bundles to rays all over the place, along axes too.
+                let spread = [1e-6, 1e-3, 0.1, 2.0][i % 4];
+                let mut middle = numbers.direction();
+                if i % 3 == 0 {
+                    middle = middle.normalize().round().try_normalize().unwrap_or(Vec3::X);
+                }
+                let mut packet = Packet {
+                    origin_ws: numbers.point() * 1.5,
+                    directions_ws: [[0.0; PACKET]; 3],
+                };
+                for ray in 0..PACKET {
+                    let along = if ray == 3 && i % 3 == 0 {
+                        Vec3::ZERO
+                    } else {
+                        numbers.point()
+                    };
+                    let direction = (middle + along * spread).normalize_or(Vec3::X);
+                    (0..3).for_each(|axis| packet.directions_ws[axis][ray] = direction[axis]);
+                }
+                let (m, d) = check_packet(&parts, &bvh, &packet, 1e-4);
+                (met, differ) = (met + m, differ + d);
+            }
+            assert!(met > 1000, "only {met} rays meet anything");
+            // Rays that pass within rounding of an edge may fall on either side of it.
+            assert!(differ <= 4, "{differ} of {met} hits differ ({})", kernel.name());
+        }
+    }
+}
+
+#[test]
+fn packets_do_not_leak_through_closed_meshes() {
+    // A fine sphere around the origin: whatever the direction, there is a triangle there, as far as the radius.
+    let mut numbers = Numbers(12);
+    let at = |i: u32, j: u32| {
+        let (polar, around) = (
+            std::f32::consts::PI * i as f32 / 24.0,
+            std::f32::consts::TAU * (j % 48) as f32 / 48.0,
+        );
+        if i == 24 {
+            Vec3::NEG_Z
+        } else {
+            Vec3::new(polar.sin() * around.cos(), polar.sin() * around.sin(), polar.cos())
+        }
+    };
+    let mut triangles = Vec::new();
+    for i in 0..24 {
+        for j in 0..48 {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    let mut parts = static_scene(&triangles);
+    parts.materials[0].double_sided = true;
+    let mut bvh = Bvh::build(&parts);
+    for kernel in Kernel::available() {
+        bvh.set_kernel(kernel);
+        for _ in 0..2000 {
+            // Towards corners and points on edges, where cracks would be.
+            let [a, b, _] = triangles[(numbers.unit() * triangles.len() as f32) as usize];
+            let mut packet = Packet {
+                origin_ws: Vec3::ZERO,
+                directions_ws: [[0.0; PACKET]; 3],
+            };
+            for ray in 0..PACKET {
+                let direction = a.lerp(b, ray as f32 / 7.0).normalize();
+                (0..3).for_each(|axis| packet.directions_ws[axis][ray] = direction[axis]);
+            }
+            for hit in bvh.nearest_of_packet(&parts, &packet) {
+                let hit = hit.expect("the sphere is closed");
+                assert!((0.98..1.001).contains(&hit.t), "{}", hit.t);
+            }
+        }
+    }
+}
+
 #[test]
 fn one_sided_triangles_have_no_back() {
     let mut numbers = Numbers(2);

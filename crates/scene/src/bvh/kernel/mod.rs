@@ -80,33 +80,45 @@ pub(super) struct LocalRay {
 }
 
 impl LocalRay {
+    /// Reciprocal of a component of a direction; finite.
+    #[inline(always)]
+    pub(super) fn inverse(component: f32) -> f32 {
+        /// Smallest component; smaller ones would make infinite reciprocals, and those NaN.
+        const SMALLEST: f32 = 1e-20;
+        1.0 / component.abs().max(SMALLEST).copysign(component)
+    }
+
+    /// [`LocalRay::inverse_far`] from [`LocalRay::inverse`].
+    #[inline(always)]
+    pub(super) fn enlarged(inverse: f32) -> f32 {
+        inverse * (1.0 + 4.0 * f32::EPSILON)
+    }
+
     /// `direction` of any length but zero.
     #[inline(always)]
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
-        /// Smallest component of a direction; smaller ones would make infinite reciprocals, and those NaN.
-        const SMALLEST: f32 = 1e-20;
-        let inverse = direction
-            .to_array()
-            .map(|d| 1.0 / if d.abs() < SMALLEST { SMALLEST.copysign(d) } else { d });
+        /// By largest axis, and whether the direction goes down it: the three axes in an order that keeps the winding.
+        static AXES: [[[usize; 3]; 2]; 3] = [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
+        // Indices and tables instead of branches: nothing predicts the largest axis of a shadow ray.
         let size = direction.abs();
-        let z = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
-        } else if size.y > size.z {
-            1
+        let largest_of_rest = if size.y > size.z { 1 } else { 2 };
+        let largest = if size.x > size.y.max(size.z) {
+            0
         } else {
-            2
+            largest_of_rest
         };
-        let next = [1, 2, 0, 1];
-        let (x, y) = (next[z], next[z + 1]);
-        let (x, y) = if direction[z] < 0.0 { (y, x) } else { (x, y) };
-        let shear_z = 1.0 / direction[z];
+        let direction = direction.to_array();
+        let axes = AXES[largest][(direction[largest].to_bits() >> 31) as usize];
+        let inverse = direction.map(Self::inverse);
+        let shear_z = 1.0 / direction[largest];
         Self {
             origin: origin.to_array(),
             inverse,
-            inverse_far: inverse.map(|d| d * (1.0 + 4.0 * f32::EPSILON)),
-            near: inverse.map(|d| if d < 0.0 { 8 } else { 0 }),
-            axes: [x, y, z],
-            shear: [direction[x] * shear_z, direction[y] * shear_z, shear_z],
+            inverse_far: inverse.map(Self::enlarged),
+            // 8 from the sign bit.
+            near: inverse.map(|d| (d.to_bits() >> 31 << 3) as usize),
+            axes,
+            shear: [direction[axes[0]] * shear_z, direction[axes[1]] * shear_z, shear_z],
         }
     }
 }
@@ -147,4 +159,31 @@ pub(super) trait Instructions {
 
     /// Which triangles the ray meets in (0, `t_max`), as a mask; `hits` is meaningful for those.
     unsafe fn triangles(ray: &Self::Ray, pack: &Pack, t_max: f32, hits: &mut PackHits) -> u32;
+
+    /// The planes of a node's boxes, from the origin of rays that share it and their directions' signs.
+    type Planes;
+
+    /// Computes them for rays like `ray`.
+    unsafe fn planes(node: &Node, ray: &LocalRay) -> Self::Planes;
+
+    /// As [`Instructions::boxes`] for one of these rays; `near` is lowered for the boxes that it meets.
+    unsafe fn boxes_at(
+        planes: &Self::Planes,
+        inverse: [f32; 3],
+        inverse_far: [f32; 3],
+        t_max: f32,
+        near: &mut [f32; WIDTH],
+    ) -> u32;
+
+    /// The corners of a pack, from the origin of rays that share it and their directions' largest axis.
+    type Corners;
+
+    /// Computes them for rays like `ray`.
+    unsafe fn corners(pack: &Pack, ray: &LocalRay) -> Self::Corners;
+
+    /// As [`Instructions::triangles`] for one of these rays.
+    unsafe fn triangles_at(corners: &Self::Corners, shear: [f32; 3], t_max: f32, hits: &mut PackHits) -> u32;
+
+    /// Which of eight rays that end at `t_max` reach the distance `near`, as a mask.
+    unsafe fn reach(near: f32, t_max: &[f32; WIDTH]) -> u32;
 }
