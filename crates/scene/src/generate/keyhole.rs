@@ -19,13 +19,36 @@ const DOOR: Opening = Opening {
     width: 1.0,
     height: 2.1,
 };
+/// The middle of the wall it stands in.
+const DOOR_Z: f32 = 5.6;
 const LEAF_TURNS: f32 = 0.06;
 
 /// Makes it: a tenth of the lights in either hidden room, the others in the bright one.
 pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
     let mut b = Builder::new("keyhole");
-    let p = Palette::new(&mut b);
-    let (xs, zs) = (vec![0.0, 5.8, 10.6], vec![0.0, 5.6, 10.8]);
+    build(&mut b, lights, seed);
+    b.finish()
+}
+
+/// [`keyhole`] with a panel in the doorway that leaves the dark room without any light.
+pub(super) fn keyhole_shut(lights: usize, seed: u32) -> SceneParts {
+    const REACH: f32 = 0.04;
+    let mut b = Builder::new("keyhole");
+    build(&mut b, lights, seed);
+    b.begin("shut door", "door panel");
+    let paint = b.lambert("painted door", [0.45, 0.16, 0.13]);
+    let half = 0.5 * DOOR.width + REACH;
+    b.cuboid(
+        [DOOR.center - half, -REACH, DOOR_Z - 0.02],
+        [DOOR.center + half, DOOR.height + REACH, DOOR_Z + 0.02],
+        paint,
+    );
+    b.finish()
+}
+
+fn build(b: &mut Builder, lights: usize, seed: u32) {
+    let p = Palette::new(b);
+    let (xs, zs) = (vec![0.0, 5.8, 10.6], vec![0.0, DOOR_Z, 10.8]);
     let doorway = |center| Opening {
         center,
         width: 1.6,
@@ -69,8 +92,8 @@ pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
         frame: p.white,
         skirting: p.white,
     };
-    plan.build(&mut b, &shell);
-    leaf(&mut b, &p);
+    plan.build(b, &shell);
+    leaf(b, &p);
 
     let hidden = share(lights, 10, 0).max(1);
     for (index, lights, kind, color, irradiance) in [
@@ -79,9 +102,9 @@ pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
         (3, hidden, Kind::Library, COOL, 40.0),
     ] {
         let mut dice = Dice::new(&[seed, 31, index as u32]);
-        let spots = furnish(&mut b, &mut dice, &p, &plan.rooms[index], index, kind);
+        let spots = furnish(b, &mut dice, &p, &plan.rooms[index], index, kind);
         light(
-            &mut b,
+            b,
             &mut dice,
             &p,
             &spots,
@@ -91,19 +114,18 @@ pub(super) fn keyhole(lights: usize, seed: u32) -> SceneParts {
         );
     }
     let dark = &plan.rooms[2];
-    furnish_dark(&mut b, &mut Dice::new(&[seed, 32]), &p, dark);
+    furnish_dark(b, &mut Dice::new(&[seed, 32]), &p, dark);
     b.place_in_world();
     let eye = Vec3::new(dark.high.x - 0.5, 1.5, dark.high.z - 0.35);
     let target = Vec3::new(dark.low.x + 2.5, 0.8, dark.low.z + 0.6);
     b.camera("dark room", eye, target, 0.95);
-    b.finish()
 }
 
 /// The door's leaf, hinged on the jamb at its low x, open into the dark room.
 fn leaf(b: &mut Builder, p: &Palette) {
     b.begin("door", "door leaf");
     let paint = b.lambert("painted door", [0.45, 0.16, 0.13]);
-    let hinge = Vec3::new(DOOR.center - 0.5 * DOOR.width + 0.015, 0.0, 5.6 + 0.085);
+    let hinge = Vec3::new(DOOR.center - 0.5 * DOOR.width + 0.015, 0.0, DOOR_Z + 0.085);
     b.place(Pose::new(hinge, -LEAF_TURNS));
     let width = DOOR.width - 0.035;
     b.cuboid([0.0, 0.018, -0.022], [width, 2.075, 0.022], paint);

@@ -18,6 +18,7 @@ mod rooms;
 mod spheres;
 
 use crate::{SceneError, SceneParts};
+use glam::Vec3;
 use lamps::Source;
 use std::ops::RangeInclusive;
 
@@ -28,6 +29,10 @@ struct Family {
     lights: RangeInclusive<usize>,
     default: usize,
     make: fn(usize, u32) -> SceneParts,
+    /// The same with a door shut, where there is one.
+    shut: Option<fn(usize, u32) -> SceneParts>,
+    /// Where the eye of a walker passes, where there is something to walk through.
+    walk: Option<fn(usize, u32) -> Vec<Vec3>>,
 }
 
 const MANY: RangeInclusive<usize> = 16..=1_000_000;
@@ -39,6 +44,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 2048,
         make: |lights, seed| rooms::rooms("rooms", lights, seed, Source::Panels),
+        shut: Some(|lights, seed| rooms::rooms_shut("rooms", lights, seed, Source::Panels)),
+        walk: Some(rooms::walk),
     },
     Family {
         name: "points",
@@ -46,6 +53,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 2048,
         make: |lights, seed| rooms::rooms("points", lights, seed, Source::Points),
+        shut: Some(|lights, seed| rooms::rooms_shut("points", lights, seed, Source::Points)),
+        walk: Some(rooms::walk),
     },
     Family {
         name: "plaza",
@@ -53,6 +62,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 4096,
         make: plaza::plaza,
+        shut: None,
+        walk: None,
     },
     Family {
         name: "sun-outside",
@@ -60,6 +71,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 2048,
         make: rooms::sun_outside,
+        shut: None,
+        walk: Some(|lights, seed| rooms::walk(lights - 1, seed)),
     },
     Family {
         name: "keyhole",
@@ -67,6 +80,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 1024,
         make: keyhole::keyhole,
+        shut: Some(keyhole::keyhole_shut),
+        walk: None,
     },
     Family {
         name: "spheres",
@@ -74,6 +89,8 @@ const FAMILIES: &[Family] = &[
         lights: MANY,
         default: 1024,
         make: spheres::spheres,
+        shut: None,
+        walk: None,
     },
     Family {
         name: "one-light",
@@ -81,6 +98,8 @@ const FAMILIES: &[Family] = &[
         lights: 1..=1,
         default: 1,
         make: |_, seed| one_light::one_light(seed),
+        shut: None,
+        walk: None,
     },
 ];
 
@@ -100,13 +119,50 @@ pub fn families() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// # Errors
 /// [`SceneError::Demo`] for an unknown name or a number of lights outside 16..=1,000,000 (1 for `one-light`).
 pub fn demo(what: &str) -> Result<SceneParts, SceneError> {
-    let mut fields = what.split(':');
-    let name = fields.next().unwrap_or_default();
-    let error = |problem: String| SceneError::Demo {
+    let (family, lights, seed) = parse(what)?;
+    Ok((family.make)(lights, seed))
+}
+
+/// The scene of [`demo`] with a door shut through which the camera gets light: the same lights in the same order.
+///
+/// # Errors
+/// Those of [`demo`], and [`SceneError::Demo`] for a scene without such a door.
+pub fn shut(what: &str) -> Result<SceneParts, SceneError> {
+    let (family, lights, seed) = parse(what)?;
+    let shut = family.shut.ok_or_else(|| {
+        let known = FAMILIES.iter().filter(|family| family.shut.is_some());
+        error(what, "there is no door to shut".into(), known)
+    })?;
+    Ok(shut(lights, seed))
+}
+
+/// A walk through the scene of [`demo`], from its camera's place on: points at the height of the eye, joined by straight
+/// lines.
+///
+/// # Errors
+/// Those of [`demo`], and [`SceneError::Demo`] for a scene without rooms to walk through.
+pub fn walk(what: &str) -> Result<Vec<Vec3>, SceneError> {
+    let (family, lights, seed) = parse(what)?;
+    let walk = family.walk.ok_or_else(|| {
+        let known = FAMILIES.iter().filter(|family| family.walk.is_some());
+        error(what, "there are no rooms to walk through".into(), known)
+    })?;
+    Ok(walk(lights, seed))
+}
+
+fn error<'f>(what: &str, problem: String, known: impl Iterator<Item = &'f Family>) -> SceneError {
+    SceneError::Demo {
         name: what.into(),
         problem,
-        known: names().collect::<Vec<_>>().join(", "),
-    };
+        known: known.map(|family| family.name).collect::<Vec<_>>().join(", "),
+    }
+}
+
+/// Family, number of lights and seed.
+fn parse(what: &str) -> Result<(&'static Family, usize, u32), SceneError> {
+    let mut fields = what.split(':');
+    let name = fields.next().unwrap_or_default();
+    let error = |problem: String| error(what, problem, FAMILIES.iter());
     let family = FAMILIES
         .iter()
         .find(|family| family.name == name)
@@ -134,7 +190,7 @@ pub fn demo(what: &str) -> Result<SceneParts, SceneError> {
             "'{rest}' is one field too many, NAME[:LIGHTS[:SEED]] is read"
         )));
     }
-    Ok((family.make)(lights, seed))
+    Ok((family, lights, seed))
 }
 
 #[cfg(test)]

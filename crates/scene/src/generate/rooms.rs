@@ -1,7 +1,10 @@
 //! A building of many furnished rooms: `rooms`, `points` and `sun-outside`.
+//!
+//! The camera looks from the hero room through doorways that stand in a line; a door may shut the first of them, and a
+//! walk leads through them.
 
 use super::builder::Builder;
-use super::building::{Opening, Plan, Room, STOREY_HEIGHT, Shell, Side};
+use super::building::{Opening, Plan, Room, STOREY_HEIGHT, Shell, Side, WALL};
 use super::dice::Dice;
 use super::fixtures::{Mood, light};
 use super::furnish::{Kind, furnish};
@@ -17,6 +20,16 @@ const ROOM: u32 = 2;
 /// Distance between the wall centre lines of the room that the camera stands in, metres.
 const HERO_SIZE: [f32; 2] = [6.6, 6.2];
 
+/// What has been built.
+struct Building {
+    /// The far corner; the near one lies at the origin.
+    size: Vec3,
+    /// Low and high corner of a panel that shuts the hero room's doorway to the back.
+    door: [Vec3; 2],
+    /// Where the eye of a walker passes, from the camera's place on.
+    walk: Vec<Vec3>,
+}
+
 /// `rooms` and `points`: `lights` lights behind walls and doors.
 pub(super) fn rooms(name: &str, lights: usize, seed: u32, source: Source) -> SceneParts {
     let mut b = Builder::new(name);
@@ -24,11 +37,26 @@ pub(super) fn rooms(name: &str, lights: usize, seed: u32, source: Source) -> Sce
     b.finish()
 }
 
+/// [`rooms`] with the hero room's doorway to the back shut.
+pub(super) fn rooms_shut(name: &str, lights: usize, seed: u32, source: Source) -> SceneParts {
+    let mut b = Builder::new(name);
+    let [low, high] = building(&mut b, lights, seed, source).door;
+    b.begin("door", "door panel");
+    let paint = b.lambert("painted door", [0.45, 0.16, 0.13]);
+    b.cuboid(low.to_array(), high.to_array(), paint);
+    b.finish()
+}
+
+/// Where the eye of somebody passes who walks through the building.
+pub(super) fn walk(lights: usize, seed: u32) -> Vec<Vec3> {
+    building(&mut Builder::new(""), lights, seed, Source::Panels).walk
+}
+
 /// `sun-outside`: the same with one lamp less and, outside of the closed building, one triangle of a thousand times the
 /// power of all lamps together. None of its light can reach the image.
 pub(super) fn sun_outside(lights: usize, seed: u32) -> SceneParts {
     let mut b = Builder::new("sun-outside");
-    let size = building(&mut b, lights - 1, seed, Source::Panels);
+    let size = building(&mut b, lights - 1, seed, Source::Panels).size;
     b.begin("sun", "sun triangle");
     let center = Vec3::new(0.5 * size.x, size.y + 30.0, 0.5 * size.z + 30.0);
     let toward = (0.5 * size - center).normalize();
@@ -60,8 +88,8 @@ fn grid(lights: usize) -> (usize, usize, usize) {
     (storeys as usize, rows as usize, columns as usize)
 }
 
-/// Builds everything but a sun; returns the building's extent.
-fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Vec3 {
+/// Builds everything but a sun and a door.
+fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Building {
     let palette = Palette::new(b);
     let (plan, hero) = lay_out(b, lights, seed);
     let shell = Shell {
@@ -89,11 +117,44 @@ fn building(b: &mut Builder, lights: usize, seed: u32, source: Source) -> Vec3 {
     let eye = Vec3::new(room.high.x - 1.15, room.low.y + 1.52, room.high.z - 0.35);
     let target = Vec3::new(room.low.x + 2.75, room.low.y + 1.12, room.low.z);
     b.camera("hall", eye, target, 0.96);
-    Vec3::new(
-        plan.xs[plan.columns()],
-        plan.storeys as f32 * STOREY_HEIGHT,
-        plan.zs[plan.rows()],
-    )
+    Building {
+        size: Vec3::new(
+            plan.xs[plan.columns()],
+            plan.storeys as f32 * STOREY_HEIGHT,
+            plan.zs[plan.rows()],
+        ),
+        door: door(&plan, hero),
+        walk: way(&plan, hero, eye),
+    }
+}
+
+/// The panel that fills the doorway to the back and reaches into the wall all round.
+fn door(plan: &Plan, hero: usize) -> [Vec3; 2] {
+    const REACH: f32 = 0.04;
+    let room = &plan.rooms[hero];
+    let opening = room.openings[Side::NegZ as usize].expect("rooms in sight are joined");
+    let foot = Vec3::new(opening.center, room.low.y, room.low.z - 0.5 * WALL);
+    let half = 0.5 * opening.width + REACH;
+    [
+        foot - Vec3::new(half, REACH, 0.02),
+        foot + Vec3::new(half, opening.height + REACH, 0.02),
+    ]
+}
+
+/// From `eye` straight through all doorways in the line of sight, ending in the room behind the last.
+fn way(plan: &Plan, hero: usize, eye: Vec3) -> Vec<Vec3> {
+    /// Before and behind a doorway the walker is this far from the wall.
+    const CLEARANCE: f32 = 0.7;
+    let mut way = vec![eye];
+    let mut index = hero;
+    while let Some(opening) = plan.rooms[index].openings[Side::NegZ as usize] {
+        let z = plan.rooms[index].low.z - 0.5 * WALL;
+        for side in [CLEARANCE, -CLEARANCE] {
+            way.push(Vec3::new(opening.center, eye.y, z + side));
+        }
+        index -= plan.columns();
+    }
+    way
 }
 
 /// Wall colours: mostly calm, now and then a bold one.

@@ -249,3 +249,39 @@ fn bad_requests_name_the_problem_and_the_scenes() {
         }
     }
 }
+
+#[test]
+fn a_shut_door_leaves_the_lights_as_they_are_and_the_open_way_shut() {
+    for what in ["rooms:64", "points:64:3", "keyhole:64"] {
+        let (open, shut) = (demo(what).unwrap(), super::shut(what).unwrap());
+        let [open, shut] = [open, shut].map(|parts| crate::Scene::new(parts).unwrap());
+        let places = |scene: &crate::Scene| scene.lights.iter().map(|l| (l.kind, l.center_ws())).collect::<Vec<_>>();
+        assert_eq!(places(&open), places(&shut), "{what}");
+        assert_eq!(shut.triangle_count(), open.triangle_count() + 12, "{what}");
+    }
+    for what in ["plaza:64", "one-light", "sun-outside:64"] {
+        assert!(super::shut(what).unwrap_err().to_string().contains("keyhole"), "{what}");
+    }
+}
+
+#[test]
+fn a_walk_meets_no_wall() {
+    for what in ["rooms:2048", "rooms:64:5", "points:300", "sun-outside:2048"] {
+        let scene = crate::Scene::new(demo(what).unwrap()).unwrap();
+        let walk = super::walk(what).unwrap();
+        assert!(walk.len() >= 3, "{what}");
+        let eye: Vec3 = scene.parts.cameras[0].world_from_camera.translation.into();
+        assert_eq!(walk[0], eye, "{what}");
+        for step in walk.windows(2) {
+            let way = step[1] - step[0];
+            let ray = crate::Ray {
+                origin_ws: step[0],
+                direction_ws: way.normalize(),
+                t_max: way.length(),
+            };
+            let hit = scene.nearest(&ray, crate::PrimitiveId::NONE);
+            assert!(hit.is_none(), "{what}: {step:?}");
+        }
+    }
+    assert!(super::walk("plaza").is_err());
+}
