@@ -19,9 +19,10 @@ fn check_scene(name: &str, scene: &scene::Scene, camera: &scene::Camera) {
         let reference = plan(Method::Exact).effort(4, 32).seed(REFERENCE_SEED);
         let reference = Case::new(scene, camera, reference).measure();
         assert!(reference.estimate.mean.mean() > 0.0, "{name}: the view is black");
-        for kind in SamplerKind::ALL {
-            let what = format!("{name}, {bounces} bounces, {}", kind.name());
-            let case = Case::new(scene, camera, plan(sampled(kind)).effort(16, 32));
+        let research = (bounces == 0).then_some(Method::Oracle);
+        for method in SamplerKind::ALL.map(sampled).into_iter().chain(research) {
+            let what = format!("{name}, {bounces} bounces, {}", method.name());
+            let case = Case::new(scene, camera, plan(method).effort(16, 32));
             assert_same(&what, &case, &reference);
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::path::{Probe, TileLog};
 use glam::{Vec2, Vec3};
-use light_cache::{LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
 use sampling::{VertexSequence, mis, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 
@@ -75,6 +75,9 @@ pub(crate) trait DirectLight: Sync + Send {
     /// Tells where the eye is.
     fn set_eye(&mut self, eye_ws: Vec3);
 
+    /// Tells that the scene has changed: see [`LightSampler::scene_changed`].
+    fn scene_changed(&mut self, _scene: &Scene) {}
+
     /// Learns from a frame.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
 
@@ -83,6 +86,16 @@ pub(crate) trait DirectLight: Sync + Send {
 
     /// What is known about each light.
     fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+
+    /// What is known in each cell.
+    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
+        Vec::new()
+    }
+
+    /// Chooses a light and does nothing with it; nothing where no choice is made.
+    fn choose(&self, _scene: &Scene, _point: &ShadingPoint, _u: u32) -> Option<Choice> {
+        None
+    }
 }
 
 /// One light per vertex, chosen by a sampler.
@@ -148,6 +161,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         self.0.set_eye(eye_ws);
     }
 
+    fn scene_changed(&mut self, scene: &Scene) {
+        self.0.scene_changed(scene);
+    }
+
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
         self.0.end_frame(scene, logs);
     }
@@ -158,6 +175,15 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         self.0.records(scene)
+    }
+
+    fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
+        self.0.cells(scene)
+    }
+
+    #[inline]
+    fn choose(&self, scene: &Scene, point: &ShadingPoint, u: u32) -> Option<Choice> {
+        self.0.sample(&self.0.local(scene, point), u)
     }
 }
 

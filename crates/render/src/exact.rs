@@ -103,6 +103,20 @@ impl AllLights {
             blocks: lights.chunks(BLOCK).map(block).collect(),
         }
     }
+
+    /// The lights that may reach a vertex, in their order; few others.
+    #[inline]
+    pub(crate) fn reaching(&self, vertex: &Vertex<'_>) -> impl Iterator<Item = u32> {
+        let (p, n) = (vertex.surface.position_ws, vertex.surface.geometric_normal_ws);
+        let masks = self.blocks.iter().map(move |block| block.may_reach(p, n));
+        masks.zip((0..).step_by(BLOCK)).flat_map(|(mut mask, first)| {
+            std::iter::from_fn(move || {
+                let light = (mask != 0).then(|| first + mask.trailing_zeros())?;
+                mask &= mask - 1;
+                Some(light)
+            })
+        })
+    }
 }
 
 impl DirectLight for AllLights {
@@ -124,18 +138,12 @@ impl DirectLight for AllLights {
         let [u0, u1] = numbers.point;
         // In f64: a million lights may add up here.
         let mut sum = DVec3::ZERO;
-        let (p, n) = (vertex.surface.position_ws, vertex.surface.geometric_normal_ws);
-        for (block, first) in self.blocks.iter().zip((0..).step_by(BLOCK)) {
-            let mut mask = block.may_reach(p, n);
-            while mask != 0 {
-                let light = first + mask.trailing_zeros();
-                mask &= mask - 1;
-                let u = Vec2::new(unit_f32(u0 ^ hash2(light, 0)), unit_f32(u1 ^ hash2(light, 1)));
-                if let Some(connection) = Connection::new(scene, vertex, light, 1.0, u)
-                    && connection.is_visible(scene, vertex, log, probe)
-                {
-                    sum += connection.contribution(1.0).as_dvec3();
-                }
+        for light in self.reaching(vertex) {
+            let u = Vec2::new(unit_f32(u0 ^ hash2(light, 0)), unit_f32(u1 ^ hash2(light, 1)));
+            if let Some(connection) = Connection::new(scene, vertex, light, 1.0, u)
+                && connection.is_visible(scene, vertex, log, probe)
+            {
+                sum += connection.contribution(1.0).as_dvec3();
             }
         }
         Direct {
@@ -149,6 +157,10 @@ impl DirectLight for AllLights {
     }
 
     fn set_eye(&mut self, _eye_ws: Vec3) {}
+
+    fn scene_changed(&mut self, scene: &Scene) {
+        *self = Self::new(&scene.lights);
+    }
 
     fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
 

@@ -1,11 +1,13 @@
 //! Rendering frame by frame. What happens inside a frame is in `path`.
 
+use crate::choosing::{self, Choosing};
 use crate::direct::{DirectLight, OneLight};
 use crate::exact::AllLights;
 use crate::filter::FilterSampler;
+use crate::oracle::Oracle;
 use crate::path::{Counters, FrameView, TileLog, render_tile};
 use crate::{Film, Method, RenderError, Settings};
-use light_cache::{LightRecord, LightSampler, Observation, Recording, SamplerStats, Visitor};
+use light_cache::{CellRecord, LightRecord, LightSampler, Observation, Recording, SamplerStats, Visitor};
 use rayon::prelude::*;
 use scene::camera::CameraRays;
 use scene::{Camera, Scene};
@@ -21,6 +23,8 @@ pub struct RenderStats {
     pub render_s: f64,
     /// Seconds of building the light structures.
     pub light_build_s: f64,
+    /// Seconds in which `oracle` found out what is best. In no other figure; 0 for all others.
+    pub prepare_s: f64,
     /// Rays traced for the nearest hit.
     pub rays_nearest: u64,
     /// Shadow rays traced.
@@ -33,19 +37,42 @@ pub struct RenderStats {
     pub skipped: Vec<String>,
 }
 
-/// A rendering in progress.
-pub trait FrameLoop: Send {
+/// A rendering in progress, of scenes that live as long as `'s`.
+///
+/// Camera and scene may change between frames: the image then starts anew, and the sampler keeps what it has learned.
+pub trait FrameLoop<'s>: Send {
     /// Renders one frame, one sample per pixel, on rayon's current thread pool, and lets the sampler learn from it.
     fn render_frame(&mut self);
 
     /// What has been accumulated.
     fn film(&self) -> &Film;
 
+    /// Starts the image anew. No random number is drawn again.
+    fn restart(&mut self);
+
+    /// Looks through another camera from now on.
+    fn set_camera(&mut self, camera: &Camera);
+
+    /// Goes on with another state of the scene: the same lights in the same order, some of which may shine otherwise, and
+    /// any geometry.
+    ///
+    /// # Errors
+    /// [`RenderError::Setting`] if there are more or fewer lights.
+    fn set_scene(&mut self, scene: &'s Scene) -> Result<(), RenderError>;
+
     /// Counters so far.
     fn stats(&self) -> RenderStats;
 
-    /// What the sampler knows about each light; empty for `exact`. Whole with [`Settings::record_lights`] only.
+    /// What the sampler knows about each light; empty for methods without one. Whole with [`Settings::record_lights`]
+    /// only.
     fn light_records(&self) -> Vec<LightRecord>;
+
+    /// What the sampler has learned about each cell; empty for samplers without cells.
+    fn cells(&self) -> Vec<CellRecord>;
+
+    /// Measures what the choice of lights costs, by making all choices of one frame again and nothing else; `None` for
+    /// methods without a sampler.
+    fn choosing(&self) -> Option<Choosing>;
 }
 
 /// Starts a rendering: builds the light structures that `settings.method` needs.
@@ -56,14 +83,15 @@ pub fn renderer<'s>(
     scene: &'s Scene,
     camera: &Camera,
     settings: &Settings,
-) -> Result<Box<dyn FrameLoop + 's>, RenderError> {
+) -> Result<Box<dyn FrameLoop<'s> + 's>, RenderError> {
     settings.check()?;
     let start = Instant::now();
     Ok(match settings.method {
         Method::Exact => {
-            let direct = AllLights::new(&scene.lights);
-            Box::new(Rendering::new(scene, camera, settings, direct, start))
+            let frames = Drawn::new(AllLights::new(&scene.lights));
+            Box::new(Rendering::new(scene, camera, settings, frames, start))
         }
+        Method::Oracle => Box::new(Rendering::new(scene, camera, settings, Oracle::new(settings), start)),
         Method::Sampled(kind) => light_cache::build(
             scene,
             &settings.light,
@@ -87,7 +115,7 @@ struct Starter<'s, 'a> {
 }
 
 impl<'s> Visitor for Starter<'s, '_> {
-    type Output = Box<dyn FrameLoop + 's>;
+    type Output = Box<dyn FrameLoop<'s> + 's>;
 
     fn visit<S: LightSampler + 'static>(self, sampler: S) -> Self::Output {
         let Self {
@@ -98,69 +126,101 @@ impl<'s> Visitor for Starter<'s, '_> {
         } = self;
         if settings.record_lights {
             let recording = Recording::new(sampler, scene, settings.light.table_decay);
-            Box::new(Rendering::new(scene, camera, settings, OneLight(recording), start))
+            let frames = Drawn::new(OneLight(recording));
+            Box::new(Rendering::new(scene, camera, settings, frames, start))
         } else {
-            Box::new(Rendering::new(scene, camera, settings, OneLight(sampler), start))
+            let frames = Drawn::new(OneLight(sampler));
+            Box::new(Rendering::new(scene, camera, settings, frames, start))
         }
     }
 }
 
-/// A rendering with one way of finding direct light.
-struct Rendering<'s, D> {
-    scene: &'s Scene,
-    camera: CameraRays,
-    filter: FilterSampler,
-    max_bounces: u32,
-    seed: u64,
-    aovs: bool,
-    area_lights: bool,
-    direct: D,
-    film: Film,
-    /// What the last frame observed, one list per tile.
-    observations: Vec<Vec<Observation>>,
-    counters: Counters,
-    render_s: f64,
-    light_build_s: f64,
+/// What frames look at, and with which random numbers.
+#[derive(Clone, Debug)]
+pub(crate) struct Eye<'s> {
+    pub(crate) scene: &'s Scene,
+    pub(crate) camera: CameraRays,
+    pub(crate) filter: FilterSampler,
+    pub(crate) image_width: u32,
+    pub(crate) image_height: u32,
+    pub(crate) max_bounces: u32,
+    pub(crate) seed: u64,
+    /// Number of the next frame since the start of the rendering, whatever has changed since. The sequence has 2^32
+    /// points; a rendering of more repeats it.
+    pub(crate) frame: u32,
+    pub(crate) area_lights: bool,
 }
 
-impl<'s, D: DirectLight> Rendering<'s, D> {
-    /// `start` is when building the light structures began.
-    fn new(scene: &'s Scene, camera: &Camera, settings: &Settings, mut direct: D, start: Instant) -> Self {
-        direct.set_eye(camera.world_from_camera.translation.into());
-        let film = Film::new(settings.width, settings.height, settings.aovs);
-        Self {
-            scene,
-            camera: camera.rays(settings.width, settings.height),
-            filter: FilterSampler::new(settings.pixel_filter),
-            max_bounces: settings.max_bounces,
-            seed: settings.seed,
-            aovs: settings.aovs,
-            area_lights: scene.lights.iter().any(|light| !light.is_delta()),
-            direct,
-            observations: vec![Vec::new(); film.tile_count()],
-            film,
-            counters: Counters::default(),
-            render_s: 0.0,
-            light_build_s: start.elapsed().as_secs_f64(),
-        }
-    }
-
-    /// One sample per pixel: all tiles in parallel, each with its own pixels, random numbers and observations, so that the
-    /// threads share nothing and their number changes nothing.
-    fn frame<const AOVS: bool>(&mut self) {
-        let view = FrameView {
+impl Eye<'_> {
+    pub(crate) fn view<'f, D>(&'f self, direct: &'f D) -> FrameView<'f, D> {
+        FrameView {
             scene: self.scene,
-            direct: &self.direct,
+            direct,
             camera: self.camera,
             filter: &self.filter,
-            image_width: self.film.width(),
+            image_width: self.image_width,
             max_bounces: self.max_bounces,
             seed: self.seed,
-            // The sequence has 2^32 points; a rendering of more repeats it.
-            frame: self.film.spp() as u32,
+            frame: self.frame,
             area_lights: self.area_lights,
-        };
-        let tiles = self.film.tiles_mut().par_iter_mut().zip(&mut self.observations);
+        }
+    }
+}
+
+/// A way to make frames.
+pub(crate) trait Frames: Send {
+    /// Called before the first frame, and when camera or scene have changed. `film` is empty.
+    fn look(&mut self, eye: &Eye<'_>, film: &mut Film);
+
+    /// Adds one sample to every pixel. With `AOVS` to the auxiliary images too.
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters;
+
+    /// Called when the scene has changed, before [`Frames::look`].
+    fn scene_changed(&mut self, scene: &Scene);
+
+    /// See [`RenderStats::prepare_s`].
+    fn prepare_s(&self) -> f64;
+
+    /// What a sampler can tell about itself; `None` if there is none.
+    fn sampler_stats(&self) -> Option<SamplerStats>;
+
+    /// See [`FrameLoop::light_records`].
+    fn light_records(&self, scene: &Scene) -> Vec<LightRecord>;
+
+    /// See [`FrameLoop::cells`].
+    fn cells(&self, scene: &Scene) -> Vec<CellRecord>;
+
+    /// See [`FrameLoop::choosing`].
+    fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing>;
+}
+
+/// Frames with one way of finding direct light.
+struct Drawn<D> {
+    direct: D,
+    /// What the last frame observed, one list per tile.
+    observations: Vec<Vec<Observation>>,
+}
+
+impl<D> Drawn<D> {
+    fn new(direct: D) -> Self {
+        Self {
+            direct,
+            observations: Vec::new(),
+        }
+    }
+}
+
+impl<D: DirectLight> Frames for Drawn<D> {
+    fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
+        self.direct.set_eye(eye.camera.origin_ws);
+        self.observations.resize(film.tile_count(), Vec::new());
+    }
+
+    /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
+    /// nothing and their number changes nothing.
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
+        let view = eye.view(&self.direct);
+        let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
         let counters = tiles.map(|(tile, observations)| {
             observations.clear();
             let mut log = TileLog {
@@ -170,20 +230,87 @@ impl<'s, D: DirectLight> Rendering<'s, D> {
             render_tile::<D, AOVS>(&view, tile, &mut log);
             log.counters
         });
-        self.counters = self.counters + counters.reduce(Counters::default, Counters::add);
-        self.film.advance(1);
-        self.direct.end_frame(self.scene, &self.observations);
+        let counters = counters.reduce(Counters::default, Counters::add);
+        self.direct.end_frame(eye.scene, &self.observations);
+        counters
+    }
+
+    fn scene_changed(&mut self, scene: &Scene) {
+        self.direct.scene_changed(scene);
+    }
+
+    fn prepare_s(&self) -> f64 {
+        0.0
+    }
+
+    fn sampler_stats(&self) -> Option<SamplerStats> {
+        self.direct.sampler_stats()
+    }
+
+    fn light_records(&self, scene: &Scene) -> Vec<LightRecord> {
+        self.direct.records(scene)
+    }
+
+    fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
+        self.direct.cells(scene)
+    }
+
+    fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing> {
+        self.direct.sampler_stats()?;
+        Some(choosing::measure(eye, &self.direct))
     }
 }
 
-impl<D: DirectLight> FrameLoop for Rendering<'_, D> {
+/// A rendering with one way of making frames.
+struct Rendering<'s, F> {
+    eye: Eye<'s>,
+    aovs: bool,
+    frames: F,
+    film: Film,
+    counters: Counters,
+    render_s: f64,
+    light_build_s: f64,
+}
+
+impl<'s, F: Frames> Rendering<'s, F> {
+    /// `start` is when building the light structures began.
+    fn new(scene: &'s Scene, camera: &Camera, settings: &Settings, frames: F, start: Instant) -> Self {
+        let mut new = Self {
+            eye: Eye {
+                scene,
+                camera: camera.rays(settings.width, settings.height),
+                filter: FilterSampler::new(settings.pixel_filter),
+                image_width: settings.width,
+                image_height: settings.height,
+                max_bounces: settings.max_bounces,
+                seed: settings.seed,
+                frame: 0,
+                area_lights: scene.lights.iter().any(|light| !light.is_delta()),
+            },
+            aovs: settings.aovs,
+            frames,
+            film: Film::new(settings.width, settings.height, settings.aovs),
+            counters: Counters::default(),
+            render_s: 0.0,
+            light_build_s: 0.0,
+        };
+        new.frames.look(&new.eye, &mut new.film);
+        new.light_build_s = (start.elapsed().as_secs_f64() - new.frames.prepare_s()).max(0.0);
+        new
+    }
+}
+
+impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     fn render_frame(&mut self) {
         let start = Instant::now();
-        if self.aovs {
-            self.frame::<true>();
+        let counters = if self.aovs {
+            self.frames.render::<true>(&self.eye, &mut self.film)
         } else {
-            self.frame::<false>();
-        }
+            self.frames.render::<false>(&self.eye, &mut self.film)
+        };
+        self.counters = self.counters + counters;
+        self.film.advance(1);
+        self.eye.frame = self.eye.frame.wrapping_add(1);
         self.render_s += start.elapsed().as_secs_f64();
     }
 
@@ -191,26 +318,52 @@ impl<D: DirectLight> FrameLoop for Rendering<'_, D> {
         &self.film
     }
 
+    fn restart(&mut self) {
+        self.film = Film::new(self.eye.image_width, self.eye.image_height, self.aovs);
+    }
+
+    fn set_camera(&mut self, camera: &Camera) {
+        self.restart();
+        self.eye.camera = camera.rays(self.eye.image_width, self.eye.image_height);
+        self.frames.look(&self.eye, &mut self.film);
+    }
+
+    fn set_scene(&mut self, scene: &'s Scene) -> Result<(), RenderError> {
+        let (before, now) = (self.eye.scene.lights.len(), scene.lights.len());
+        if before != now {
+            return Err(RenderError::Setting {
+                what: format!("the scene had {before} lights and now has {now}"),
+                remedy: "a rendering can go on with the same lights only".into(),
+            });
+        }
+        self.restart();
+        self.eye.scene = scene;
+        self.frames.scene_changed(scene);
+        self.frames.look(&self.eye, &mut self.film);
+        Ok(())
+    }
+
     fn stats(&self) -> RenderStats {
-        let sampler = self.direct.sampler_stats();
+        let sampler = self.frames.sampler_stats();
         let mut skipped = sampler.as_ref().map_or_else(Vec::new, |s| s.skipped.clone());
         let mut skip = |condition: bool, what: &str| {
             if condition {
                 skipped.push(what.into());
             }
         };
-        skip(self.scene.lights.is_empty(), "no lights: no light sampling, no bounces");
-        let delta_only = !self.area_lights && !self.scene.lights.is_empty();
+        let Eye { scene, area_lights, .. } = self.eye;
+        skip(scene.lights.is_empty(), "no lights: no light sampling, no bounces");
         skip(
-            delta_only,
+            !area_lights && !scene.lights.is_empty(),
             "punctual lights only: no BSDF rays towards lights, no multiple importance sampling",
         );
-        skip(self.max_bounces == 0, "no bounces asked for: no indirect light");
+        skip(self.eye.max_bounces == 0, "no bounces asked for: no indirect light");
         skip(!self.aovs, "no auxiliary images asked for: none kept");
         RenderStats {
             frames: self.film.spp(),
             render_s: self.render_s,
             light_build_s: self.light_build_s,
+            prepare_s: self.frames.prepare_s(),
             rays_nearest: self.counters.rays_nearest,
             rays_occluded: self.counters.rays_occluded,
             nonfinite_samples: self.counters.nonfinite,
@@ -220,7 +373,15 @@ impl<D: DirectLight> FrameLoop for Rendering<'_, D> {
     }
 
     fn light_records(&self) -> Vec<LightRecord> {
-        self.direct.records(self.scene)
+        self.frames.light_records(self.eye.scene)
+    }
+
+    fn cells(&self) -> Vec<CellRecord> {
+        self.frames.cells(self.eye.scene)
+    }
+
+    fn choosing(&self) -> Option<Choosing> {
+        self.frames.choosing(&self.eye)
     }
 }
 

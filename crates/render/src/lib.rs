@@ -2,10 +2,11 @@
 //!
 //! [`renderer`] gives an object that renders one frame (one sample per pixel) at a time into its [`Film`]; the caller
 //! decides when to stop. `exact` is a sibling of the samplers: it sums over all lights and uses no cache, and
-//! everything is judged by it.
+//! everything is judged by it. `oracle` knows the best choice of one light per pixel: how far learning is from it.
 //!
 //! Absent from this crate: windows, the command line. Deterministic for a seed at any thread count.
 
+mod choosing;
 mod direct;
 pub mod error;
 mod exact;
@@ -14,10 +15,12 @@ mod filter;
 pub mod frame;
 pub mod image;
 pub mod metric;
+mod oracle;
 mod path;
 pub mod rays;
 pub mod settings;
 
+pub use choosing::Choosing;
 pub use error::RenderError;
 pub use film::{Film, Image};
 pub use frame::{FrameLoop, RenderStats, renderer};

@@ -12,6 +12,9 @@ pub enum Method {
     Sampled(SamplerKind),
     /// All lights at every path vertex: the judge. No cache, no choice.
     Exact,
+    /// Research: one light per pixel, chosen with the best possible probabilities, which are worked out beforehand and not
+    /// counted as time. Direct light at the first hit only.
+    Oracle,
 }
 
 impl Method {
@@ -20,12 +23,28 @@ impl Method {
         match self {
             Self::Sampled(kind) => kind.name(),
             Self::Exact => "exact",
+            Self::Oracle => "oracle",
         }
     }
 
-    /// All of them.
+    /// All that render anything, whatever the other settings.
     pub fn all() -> impl Iterator<Item = Self> {
         SamplerKind::ALL.into_iter().map(Self::Sampled).chain([Self::Exact])
+    }
+
+    /// [`Method::all`], and those that serve research only.
+    pub fn all_and_research() -> impl Iterator<Item = Self> {
+        Self::all().chain([Self::Oracle])
+    }
+
+    /// What has to be said wherever results of this method are shown; `None` for methods that anyone may use.
+    pub fn research_note(self) -> Option<&'static str> {
+        match self {
+            Self::Oracle => {
+                Some("research: knows the lights that each pixel sees, and finding out is not counted as time")
+            }
+            Self::Sampled(_) | Self::Exact => None,
+        }
     }
 }
 
@@ -39,8 +58,8 @@ impl TryFrom<String> for Method {
     type Error = String;
 
     fn try_from(name: String) -> Result<Self, String> {
-        Self::all().find(|m| m.name() == name).ok_or_else(|| {
-            let names: Vec<_> = Self::all().map(Self::name).collect();
+        Self::all_and_research().find(|m| m.name() == name).ok_or_else(|| {
+            let names: Vec<_> = Self::all_and_research().map(Self::name).collect();
             format!("no method '{name}'; try one of: {}", names.join(", "))
         })
     }
@@ -74,6 +93,10 @@ pub struct Settings {
     pub max_bounces: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads.
     pub seed: u64,
+    /// `oracle`: times that it looks at all lights from every pixel, 1..=65,536. Higher values come closer to the best
+    /// choice; lower values are prepared sooner. 16.
+    #[serde(default = "default_oracle_passes")]
+    pub oracle_passes: u32,
     /// Pixel filter.
     pub pixel_filter: PixelFilter,
     /// Light choice.
@@ -94,12 +117,17 @@ impl Default for Settings {
             method: Method::Sampled(SamplerKind::Adaptive),
             max_bounces: 0,
             seed: 0,
+            oracle_passes: default_oracle_passes(),
             pixel_filter: PixelFilter::Box,
             light: light_cache::Settings::default(),
             aovs: false,
             record_lights: false,
         }
     }
+}
+
+fn default_oracle_passes() -> u32 {
+    16
 }
 
 impl Settings {
@@ -120,6 +148,18 @@ impl Settings {
         if !sizes.contains(&self.width) || !sizes.contains(&self.height) {
             let what = format!("image of {} x {} pixels", self.width, self.height);
             return refuse(what, "width and height must be 1 to 32,768");
+        }
+        if self.method == Method::Oracle && self.max_bounces > 0 {
+            return refuse(
+                format!("oracle with max_bounces = {}", self.max_bounces),
+                "it knows what is best for direct light at the first hit only: max_bounces must be 0",
+            );
+        }
+        if !(1..=65_536).contains(&self.oracle_passes) {
+            return refuse(
+                format!("oracle_passes = {}", self.oracle_passes),
+                "it must be 1 to 65,536; 16 is usual",
+            );
         }
         let mass = self.light.min_probability_mass;
         if !share.contains(&mass) {
@@ -154,9 +194,11 @@ mod tests {
     fn settings_out_of_range_are_refused_with_the_range() {
         Settings::default().check().expect("the default is valid");
         type Spoil = fn(&mut Settings);
-        let odd: [(&str, Spoil); 7] = [
+        let odd: [(&str, Spoil); 9] = [
             ("0 x 720", |s| s.width = 0),
             ("1280 x 40000", |s| s.height = 40_000),
+            ("max_bounces = 2", |s| (s.method, s.max_bounces) = (Method::Oracle, 2)),
+            ("oracle_passes", |s| s.oracle_passes = 0),
             ("min_probability_mass", |s| s.light.min_probability_mass = 1.5),
             ("min_probability_mass", |s| s.light.min_probability_mass = f32::NAN),
             ("table_decay", |s| s.light.table_decay = 0.0),
@@ -173,7 +215,7 @@ mod tests {
 
     #[test]
     fn methods_are_written_by_name() {
-        for method in Method::all() {
+        for method in Method::all_and_research() {
             let json = serde_json::to_string(&method).expect("serialisable");
             assert_eq!(json, format!("\"{}\"", method.name()));
             assert_eq!(serde_json::from_str::<Method>(&json).expect("its own name"), method);

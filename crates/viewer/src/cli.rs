@@ -82,6 +82,12 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "MASS", default_value_t = light_cache::Settings::default().min_probability_mass,
           value_parser = share)]
     pub(crate) min_probability_mass: f32,
+    /// `oracle`: times that it looks at all lights from every pixel before it starts
+    ///
+    /// Higher values come closer to the best choice; lower values are prepared sooner.
+    #[arg(long, value_name = "N", default_value_t = render::Settings::default().oracle_passes,
+          value_parser = clap::value_parser!(u32).range(1..=65_536))]
+    pub(crate) oracle_passes: u32,
     /// BIASED: ignore lights whose learned importance is below this share of the mean; 0 = off
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, default_value_t = 0.0, value_parser = not_negative)]
     pub(crate) ignore_below: f32,
@@ -138,6 +144,7 @@ impl LightArgs {
             method,
             max_bounces: self.max_bounces,
             seed: self.seed,
+            oracle_passes: self.oracle_passes,
             pixel_filter: self.pixel_filter.into(),
             light: light_cache::Settings {
                 min_probability_mass: self.min_probability_mass,
@@ -189,6 +196,7 @@ pub(crate) fn default_method() -> &'static str {
 pub(crate) fn describe(method: Method) -> &'static str {
     match method {
         Method::Exact => "all lights at every point: the judge, slow",
+        Method::Oracle => "research: the best possible choice at first hits, whose preparation is not counted as time",
         Method::Sampled(kind) => match kind {
             SamplerKind::Uniform => "every light alike",
             SamplerKind::Power => "in proportion to emitted power",
@@ -203,7 +211,7 @@ pub(crate) fn describe(method: Method) -> &'static str {
 
 /// Accepts the names of all methods.
 pub(crate) fn any_method() -> impl TypedValueParser<Value = Method> {
-    methods(Method::all().collect())
+    methods(Method::all_and_research().collect())
 }
 
 /// Accepts the names of the methods that choose lights.

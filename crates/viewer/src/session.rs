@@ -114,7 +114,7 @@ pub(crate) fn camera<'s>(scene: &'s Scene, wanted: Option<&str>) -> Result<&'s C
 ///
 /// # Errors
 /// Settings out of range; [`Refusal::OutOfMemory`].
-pub(crate) fn start<'s>(scene: &'s Scene, camera: &Camera, settings: &Settings) -> Result<Box<dyn FrameLoop + 's>> {
+pub(crate) fn start<'s>(scene: &'s Scene, camera: &Camera, settings: &Settings) -> Result<Box<dyn FrameLoop<'s> + 's>> {
     // Compensated sums, moments, finished image and what the file writer copies; auxiliary images about double it.
     let bytes_per_pixel = if settings.aovs { 256 } else { 128 };
     let bytes = u64::from(settings.width) * u64::from(settings.height) * bytes_per_pixel;
@@ -159,11 +159,11 @@ impl Budget {
 /// Renders until the budget is spent or a signal comes; at least one frame. `each` sees the state after every frame,
 /// its time does not count. Returns the seconds spent in frames.
 pub(crate) fn render_frames(
-    frame_loop: &mut dyn FrameLoop,
+    frame_loop: &mut dyn FrameLoop<'_>,
     budget: Budget,
     watch: &Watch,
     what: &str,
-    mut each: impl FnMut(&dyn FrameLoop),
+    mut each: impl FnMut(&dyn FrameLoop<'_>),
 ) -> f64 {
     let pixels = u64::from(frame_loop.film().width()) * u64::from(frame_loop.film().height());
     let mut progress = Progress::new(what);

@@ -122,7 +122,7 @@ fn settings(method: Method, size: u32, max_bounces: u32) -> Settings {
 
 const UNIFORM: Method = Method::Sampled(SamplerKind::Uniform);
 
-fn rendered<'s>(scene: &'s Scene, settings: &Settings, frames: u32) -> Box<dyn FrameLoop + 's> {
+fn rendered<'s>(scene: &'s Scene, settings: &Settings, frames: u32) -> Box<dyn FrameLoop<'s> + 's> {
     let mut frame_loop = renderer(scene, &camera(), settings).expect("valid settings");
     for _ in 0..frames {
         frame_loop.render_frame();
@@ -341,6 +341,96 @@ fn records_are_kept_for_samplers_that_do_not_learn() {
     assert!(
         shares > 0.0 && shares <= mean(&recording.film().image()) * 1.5,
         "{shares}"
+    );
+}
+
+#[test]
+fn oracle_agrees_with_exact_and_beats_every_sampler() {
+    let lights: Vec<(Vec3, Vec3)> = (0..24)
+        .map(|i| {
+            let angle = i as f32;
+            let at = Vec3::new(0.8 * angle.cos(), 0.4 * (3.0 * angle).sin(), 0.8 * angle.sin());
+            (at, Vec3::splat(0.1 + 0.02 * angle))
+        })
+        .collect();
+    let mut relative = Vec::new();
+    for wall in [lambert(0.7), glossy()] {
+        let scene = box_scene(wall, lamp(), &lights);
+        let exact = rendered(&scene, &settings(Method::Exact, 24, 0), 256);
+        let oracle = rendered(&scene, &settings(Method::Oracle, 24, 0), 256);
+        let (a, b) = (oracle.film(), exact.film());
+        let z = metric::z_scores(&a.image(), &a.variance(), &b.image(), &b.variance()).expect("same size");
+        assert!(z.iter().filter(|z| z.abs() > 4.0).count() * 200 <= z.len());
+        let error = standard_error(a).hypot(standard_error(b));
+        let difference = mean(&a.image()) - mean(&b.image());
+        assert!(difference.abs() < 4.0 * error, "{difference} +- {error}");
+        let stats = oracle.stats();
+        assert!(stats.prepare_s > stats.light_build_s && stats.sampler.is_some_and(|s| s.bytes > 0));
+        for kind in [SamplerKind::Uniform, SamplerKind::Power, SamplerKind::Tree] {
+            let sampled = rendered(&scene, &settings(Method::Sampled(kind), 24, 0), 256);
+            relative.push(standard_error(a) / standard_error(sampled.film()));
+        }
+    }
+    assert!(relative.iter().all(|r| *r < 0.9), "{relative:?}");
+}
+
+#[test]
+fn camera_and_scene_may_change() {
+    let bright = Material::emitter("lamp", Vec3::splat(6.0));
+    let dim = Material::emitter("lamp", Vec3::splat(0.006));
+    let points = [(Vec3::ZERO, Vec3::splat(0.01))];
+    let (before, after) = (
+        box_scene(lambert(0.5), Some(dim), &points),
+        box_scene(lambert(0.5), Some(bright), &points),
+    );
+    let elsewhere = Camera::look_at("b", Vec3::new(0.3, 0.2, 0.5), Vec3::new(0.0, -1.0, 0.0), Vec3::Z, 1.2);
+    let expected = {
+        let mut exact = renderer(&after, &elsewhere, &settings(Method::Exact, 16, 0)).expect("valid settings");
+        (0..256).for_each(|_| exact.render_frame());
+        (mean(&exact.film().image()), standard_error(exact.film()))
+    };
+    // Methods whose structures follow the scene's change.
+    for method in [UNIFORM, Method::Exact, Method::Oracle] {
+        let mut frame_loop = rendered(&before, &settings(method, 16, 0), 4);
+        frame_loop.set_camera(&elsewhere);
+        assert_eq!(frame_loop.film().spp(), 0);
+        frame_loop.render_frame();
+        frame_loop.set_scene(&after).expect("as many lights");
+        (0..512).for_each(|_| frame_loop.render_frame());
+        assert_eq!(frame_loop.stats().frames, 512);
+        let (found, error) = (mean(&frame_loop.film().image()), standard_error(frame_loop.film()));
+        let bound = 4.0 * error.hypot(expected.1) + 1e-4 * expected.0;
+        assert!(
+            (found - expected.0).abs() < bound,
+            "{method:?}: {found} {expected:?} +- {error}"
+        );
+        let first = frame_loop.film().image();
+        frame_loop.restart();
+        frame_loop.render_frame();
+        assert_ne!(frame_loop.film().image(), first);
+    }
+    let other = box_scene(lambert(0.5), None, &points);
+    let mut frame_loop = rendered(&before, &settings(UNIFORM, 16, 0), 1);
+    let message = frame_loop.set_scene(&other).expect_err("fewer lights").to_string();
+    assert!(message.contains("3 lights") && message.contains('1'), "{message}");
+}
+
+#[test]
+fn the_cost_of_choosing_is_measured() {
+    let scene = box_scene(lambert(0.5), lamp(), &[(Vec3::ZERO, Vec3::ONE)]);
+    for (kind, bounces, least) in [(SamplerKind::Tree, 0, 200), (SamplerKind::Uniform, 2, 400)] {
+        let frame_loop = rendered(&scene, &settings(Method::Sampled(kind), 16, bounces), 1);
+        let choosing = frame_loop.choosing().expect("it chooses");
+        assert!(
+            choosing.ns_per_choice > 0.0 && choosing.per_frame >= least,
+            "{choosing:?}"
+        );
+        assert!((choosing.share(1.0, 2) - choosing.share(2.0, 1)).abs() < 1e-12);
+    }
+    assert!(
+        rendered(&scene, &settings(Method::Exact, 16, 0), 1)
+            .choosing()
+            .is_none()
     );
 }
 

@@ -1,5 +1,6 @@
-//! `dump`: what was learned about each light, as a table.
+//! `dump`: what was learned about each light, or in each cell, as a table.
 
+mod cells;
 mod rows;
 mod write;
 
@@ -11,8 +12,10 @@ use crate::session::{self, Budget};
 use crate::{message, output, table};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use light_cache::SamplerKind;
 use render::Method;
 use std::path::{Path, PathBuf};
+use write::Row;
 
 /// Options of `dump`.
 #[derive(Debug, Args)]
@@ -21,9 +24,12 @@ Examples:
   manylight dump demo:rooms -o lights.csv
   manylight dump hall.glb -o - --top 10
   manylight dump hall.glb -o lights.parquet --spp 64 --sampler table
+  manylight dump demo:rooms --cells -o cells.csv
 
 One row per light. max_contribution and mean_contribution are luminances at the camera, visible_fraction is empty for a
-light that was never drawn; probability is how likely the light is drawn now and totals 1 over all lights.")]
+light that was never drawn; probability is how likely the light is drawn now and totals 1 over all lights.
+With --cells, one row per entry of each cell's cut: cell, its centre, size, normal and whether it is for first hits; the
+light or cluster (its first light, and how many), its probability in the cell, visible fraction, samples, and the cell's age.")]
 pub(crate) struct DumpArgs {
     /// A .gltf or .glb file, or demo:NAME[:LIGHTS[:SEED]]
     scene: String,
@@ -33,8 +39,11 @@ pub(crate) struct DumpArgs {
     /// Format; default: by the file name, CSV on stdout
     #[arg(long, value_enum)]
     format: Option<Format>,
+    /// Write what was learned in each cell instead; `adaptive` only
+    #[arg(long)]
+    cells: bool,
     /// Only the N lights that are drawn most probably, those first
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", conflicts_with = "cells")]
     top: Option<usize>,
     #[command(flatten)]
     budget: BudgetArgs,
@@ -91,8 +100,14 @@ pub(crate) fn run(args: &DumpArgs) -> Result<Status> {
     if !to_stdout {
         output::check_writable(&args.output)?;
     }
+    if args.cells && args.sampler != Method::Sampled(SamplerKind::Adaptive) {
+        bail!(
+            "--cells: '{}' keeps no cells; give --sampler adaptive",
+            args.sampler.name()
+        );
+    }
     let mut settings = args.light.settings(args.sampler, args.size.or((640, 360)))?;
-    settings.record_lights = true;
+    settings.record_lights = !args.cells;
     settings.check()?;
 
     session::use_threads(args.light.threads)?;
@@ -104,18 +119,31 @@ pub(crate) fn run(args: &DumpArgs) -> Result<Status> {
     let seconds = session::render_frames(frames.as_mut(), budget, &watch, "learning", |_| {});
 
     let interrupted = watch.writing();
-    let rows = rows::collect(&loaded.scene, &frames.light_records(), args.top);
-    if to_stdout {
-        write::rows(output::stdout(), format, &rows)?;
+    let written = if args.cells {
+        let rows = frames.cells();
+        save(args, format, &rows)?;
+        format!("{} entries of cells", table::thousands(rows.len() as u64))
     } else {
-        output::write_with(&args.output, |file| write::rows(file, format, &rows))?;
+        let rows = rows::collect(&loaded.scene, &frames.light_records(), args.top);
+        save(args, format, &rows)?;
+        let [some, all] = [rows.len(), loaded.scene.lights.len()].map(|count| table::thousands(count as u64));
+        format!("{some} of {all} lights")
+    };
+    if !to_stdout {
         message::note(format!(
-            "{}: {} of {} lights after {} frames, {seconds:.2} s",
+            "{}: {written} after {} frames, {seconds:.2} s",
             args.output.display(),
-            table::thousands(rows.len() as u64),
-            table::thousands(loaded.scene.lights.len() as u64),
             frames.film().spp()
         ));
     }
     Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}
+
+/// Writes the table to where it was asked for.
+fn save<R: Row>(args: &DumpArgs, format: Format, rows: &[R]) -> Result<()> {
+    if is_stdout(&args.output) {
+        write::rows(output::stdout(), format, rows)
+    } else {
+        output::write_with(&args.output, |file| write::rows(file, format, rows))
+    }
 }

@@ -98,7 +98,9 @@ fn program_text() -> String {
     );
     section(
         "\nSamplers:\n",
-        Method::all().map(|m| (m.name().into(), describe(m).into())).collect(),
+        Method::all_and_research()
+            .map(|m| (m.name().into(), describe(m).into()))
+            .collect(),
     );
     let variables = ENVIRONMENT.map(|(name, what)| {
         let value = std::env::var(name).map_or("not set".into(), |value| format!("= {value}"));
@@ -116,7 +118,7 @@ fn program_json() -> Result<String> {
     let json = json!({
         "machine": Machine::detect(),
         "demos": pairs(generate::families().map(|(name, what)| (name.into(), what.into())).collect()),
-        "samplers": pairs(Method::all().map(|m| (m.name().into(), describe(m).into())).collect()),
+        "samplers": pairs(Method::all_and_research().map(|m| (m.name().into(), describe(m).into())).collect()),
         "environment": serde_json::Map::from_iter(variables),
     });
     Ok(serde_json::to_string_pretty(&json)? + "\n")

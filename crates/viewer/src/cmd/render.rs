@@ -148,7 +148,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         display.finish(&image);
     }
     let run = frames.stats();
-    let stats = Stats::new(&loaded, &camera.name, &settings, &run, interrupted);
+    // Measuring takes about as long as a frame: only where somebody will read the result.
+    let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
+    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted);
     match format {
         Format::Png => {
             let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
@@ -223,6 +225,7 @@ fn metadata(stats: &Stats, settings: &Settings) -> Result<Vec<(String, String)>>
         entry("spp", stats.spp.to_string()),
         entry("seed", stats.seed.to_string()),
         entry("render_s", stats.render_s.to_string()),
+        entry("research", stats.research.unwrap_or("no").into()),
         entry("biased", stats.biased.clone().unwrap_or_else(|| "no".into())),
         entry("settings", serde_json::to_string(settings)?),
     ])
@@ -247,6 +250,13 @@ fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &Render
         loaded.scene.build_s,
         run.light_build_s,
     ));
+    if let Some(note) = settings.method.research_note() {
+        message::note(format!(
+            "{}: {note} ({:.2} s here)",
+            settings.method.name(),
+            run.prepare_s
+        ));
+    }
     for skipped in stats::skipped(&loaded.scene, run) {
         message::detail(format!("skipped: {skipped}"));
     }

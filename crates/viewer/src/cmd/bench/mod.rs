@@ -4,6 +4,7 @@ mod plot;
 mod reference;
 mod report;
 mod run;
+mod scenario;
 mod summary;
 
 use crate::cli::{LightArgs, SizeArgs, any_method, seconds};
@@ -17,6 +18,7 @@ use light_cache::SamplerKind;
 use reference::Reference;
 use render::Method;
 use run::Run;
+use scenario::Scenario;
 use std::path::PathBuf;
 use summary::SceneResult;
 
@@ -26,6 +28,8 @@ use summary::SceneResult;
 Examples:
   manylight bench                                              all generated scenes, all samplers (a coffee long)
   manylight bench demo:rooms --samplers uniform,power,table --time 1,4
+  manylight bench demo:rooms --samplers tree,adaptive,oracle   how far from the best possible choice?
+  manylight bench demo:rooms --scenario walk --samplers tree,adaptive    errors of single frames on the move
   manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
 
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
@@ -35,17 +39,25 @@ The reference is two independent images a and b. The error of x is (x - a)(x - b
 averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
 error, but adds no offset. Efficiency is 1 / (error x seconds), at the latest time at which the
 errors of all samplers stand out of the reference's noise.
+oracle draws one light per pixel with the best possible probabilities; finding them is not counted as time, so compare it
+at equal samples.
 Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
 pub(crate) struct BenchArgs {
     /// .gltf or .glb files, or demo:NAME[:LIGHTS[:SEED]]; default: all generated scenes
     scenes: Vec<String>,
-    /// Samplers to compare; default: all but exact
+    /// Samplers to compare; default: all but exact and oracle
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = any_method())]
     samplers: Vec<Method>,
     /// Times at which errors are compared, in seconds; every run lasts as long as the last of them
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0.1,1,10", value_parser = seconds)]
     time: Vec<f64>,
-    /// Runs per sampler, each with another seed; the table shows medians, summary.json also the spread
+    /// Measure single frames while something changes, instead of errors over time
+    #[arg(long, value_enum)]
+    scenario: Option<Scenario>,
+    /// Frames of a walk, or before and after a change each
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = frame_count, requires = "scenario")]
+    frames: usize,
+    /// Runs per sampler, each with another seed; tables show medians and the spread
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
     /// Samples per pixel of the reference, half of them in each of its two images
@@ -68,6 +80,12 @@ pub(crate) struct BenchArgs {
     output: PathBuf,
 }
 
+/// Reads the number of frames of a scenario.
+fn frame_count(text: &str) -> Result<usize, String> {
+    let count = text.parse().ok().filter(|count| (4..=100_000).contains(count));
+    count.ok_or_else(|| "must be 4 to 100,000".into())
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -75,12 +93,18 @@ pub(crate) struct BenchArgs {
 pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     let methods: Vec<Method> = match args.samplers.as_slice() {
         [] => SamplerKind::ALL.map(Method::Sampled).to_vec(),
-        some => Method::all().filter(|method| some.contains(method)).collect(),
+        some => Method::all_and_research()
+            .filter(|method| some.contains(method))
+            .collect(),
     };
     let scenes: Vec<String> = match args.scenes.as_slice() {
+        [] if args.scenario.is_some() => vec!["demo:rooms".into()],
         [] => scene::generate::names().map(|name| format!("demo:{name}")).collect(),
         some => some.to_vec(),
     };
+    if args.reference.is_some() && args.scenario.is_some() {
+        bail!("--reference is one image, a scenario needs one for every state and camera: leave it away");
+    }
     if args.reference.is_some() && scenes.len() != 1 {
         bail!("--reference is for one scene, {} are given", scenes.len());
     }
@@ -97,6 +121,9 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         .clone()
         .unwrap_or_else(|| reference::default_cache(&args.output));
     session::use_threads(args.light.threads)?;
+    if let Some(scenario) = args.scenario {
+        return scenario::run(args, scenario, &scenes, &methods, &settings, &cache);
+    }
 
     let mut results = Vec::new();
     let mut interrupted = false;

@@ -4,6 +4,7 @@ use super::reference::safe_name;
 use super::summary::{Point, SamplerResult, SceneResult};
 use crate::output;
 use anyhow::{Context, Result};
+use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 use std::ops::Range;
 use std::path::Path;
@@ -27,7 +28,7 @@ const SIZE: (u32, u32) = (860, 520);
 const LEGEND_WIDTH: i32 = 140;
 
 /// A line: what it is called, and its (x, relMSE).
-type Line<'a> = (&'a str, Vec<(f64, f64)>);
+pub(super) type Line<'a> = (&'a str, Vec<(f64, f64)>);
 
 /// Writes `SCENE-time.svg` and `SCENE-spp.svg`.
 ///
@@ -59,15 +60,22 @@ pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
         ("time", "seconds (light build and learning included)", over_time),
         ("spp", "samples per pixel", over_spp),
     ] {
-        if let Some(svg) = plot(&title, axis, &lines)? {
+        if let Some(svg) = plot(&title, axis, Axis::Logarithmic, &lines)? {
             output::write(&folder.join(format!("{name}-{suffix}.svg")), svg.as_bytes())?;
         }
     }
     Ok(())
 }
 
-/// The plot as SVG; `None` if there is nothing to draw on logarithmic axes.
-fn plot(title: &str, axis: &str, lines: &[Line<'_>]) -> Result<Option<String>> {
+/// How the horizontal axis runs; the vertical one is always logarithmic.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Axis {
+    Linear,
+    Logarithmic,
+}
+
+/// The plot as SVG; `None` if there is nothing to draw.
+pub(super) fn plot(title: &str, axis: &str, kind: Axis, lines: &[Line<'_>]) -> Result<Option<String>> {
     let all = || {
         lines
             .iter()
@@ -84,17 +92,26 @@ fn plot(title: &str, axis: &str, lines: &[Line<'_>]) -> Result<Option<String>> {
     let x_range = range(&mut all().map(|(x, _)| x));
     let y_range = range(&mut all().map(|(_, y)| y));
     let mut svg = String::new();
-    draw(&mut svg, (title, axis), (x_range, y_range), lines).context("cannot draw the plot")?;
+    match kind {
+        Axis::Linear => draw(&mut svg, (title, axis), x_range, y_range, lines),
+        Axis::Logarithmic => draw(&mut svg, (title, axis), x_range.log_scale(), y_range, lines),
+    }
+    .context("cannot draw the plot")?;
     Ok(Some(svg))
 }
 
 /// Draws points (all on the axes) and lines between them; the legend stands right of the axes, where it hides nothing.
-fn draw(
+fn draw<X>(
     svg: &mut String,
     (title, axis): (&str, &str),
-    (x_range, y_range): (Range<f64>, Range<f64>),
+    x_range: X,
+    y_range: Range<f64>,
     lines: &[Line<'_>],
-) -> Result<()> {
+) -> Result<()>
+where
+    X: AsRangedCoord<Value = f64>,
+    X::CoordDescType: Ranged<ValueType = f64> + ValueFormatter<f64>,
+{
     let area = SVGBackend::with_string(svg, SIZE).into_drawing_area();
     area.fill(&WHITE)?;
     let mut chart = ChartBuilder::on(&area)
@@ -103,7 +120,7 @@ fn draw(
         .margin_right(14 + LEGEND_WIDTH)
         .x_label_area_size(48)
         .y_label_area_size(72)
-        .build_cartesian_2d(x_range.log_scale(), y_range.log_scale())?;
+        .build_cartesian_2d(x_range, y_range.log_scale())?;
     chart
         .configure_mesh()
         .x_desc(axis)

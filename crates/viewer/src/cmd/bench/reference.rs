@@ -102,6 +102,7 @@ impl Reference {
                 method: Method::Exact,
                 seed,
                 light: light_cache::Settings::default(),
+                oracle_passes: Settings::default().oracle_passes,
                 ..settings.clone()
             };
             let path = cache.join(key(scene, camera, &settings, each)? + ".exr");

@@ -21,9 +21,29 @@ pub(super) fn table(result: &SceneResult) -> String {
         times_table(result)
     );
     text += "relMSE without the worst 0.1 % of the pixels, +- one standard error of the last:\n";
-    text += &errors_table(result);
+    text += &errors_table(result, |point| {
+        let mark = if point.is_noise() { "~" } else { "" };
+        format!("{mark}{}", number(point.relmse_trimmed))
+    });
     if all_points(result).any(Point::is_noise) {
         text += "~ less than two standard errors above 0: a better reference (--reference-spp) would tell\n";
+    }
+    let seeds = result.samplers.iter().map(|s| s.seeds).max().unwrap_or(0);
+    if seeds > 1 {
+        text += &format!("the same, least to largest over {seeds} seeds:\n");
+        text += &errors_table(result, |point| {
+            let ends = [point.relmse_trimmed_min, point.relmse_trimmed_max];
+            ends.map(number).join(" to ")
+        });
+    }
+    if all_points(result).any(|point| point.to_oracle.is_some()) {
+        text += "the same as a multiple of that of oracle:\n";
+        text += &errors_table(result, |point| number(point.to_oracle.unwrap_or(f64::NAN)));
+    }
+    for sampler in &result.samplers {
+        if let Some(note) = sampler.research {
+            text += &format!("{}: {note}\n", sampler.sampler);
+        }
     }
     text + "\n"
 }
@@ -48,27 +68,30 @@ fn times_table(result: &SceneResult) -> String {
         "p99",
         "max",
         "build ms",
-        "learn ms",
+        "learn %",
+        "choose %",
         &efficiency,
         "x uniform",
+        "x tree",
         "x best other",
     ];
     let row = |s: &SamplerResult| {
         let times = [s.frame_ms_median, s.frame_ms_p95, s.frame_ms_p99, s.frame_ms_max];
-        let seconds = [s.light_build_s, s.learn_s];
-        let ratios = [s.efficiency, s.to_uniform, s.to_best_other];
+        let shares = [s.learn_share, s.choose_share.unwrap_or(f64::NAN)];
+        let ratios = [s.efficiency, s.to_uniform, s.to_tree, s.to_best_other];
         [s.sampler.to_string(), s.frames.to_string()]
             .into_iter()
             .chain(times.map(number))
-            .chain(seconds.map(|s| number(s * 1e3)))
+            .chain([number(s.light_build_s * 1e3)])
+            .chain(shares.map(|share| number(share * 100.0)))
             .chain(ratios.map(|value| number(value.unwrap_or(f64::NAN))))
             .collect()
     };
     align(&header, &result.samplers.iter().map(row).collect::<Vec<_>>(), 1)
 }
 
-/// Errors after 1, 4, 16 ... frames and at the times asked for.
-fn errors_table(result: &SceneResult) -> String {
+/// What `show` tells of the errors after 1, 4, 16 ... frames and at the times asked for.
+fn errors_table(result: &SceneResult, show: impl Fn(&Point) -> String) -> String {
     let moments = |points: fn(&SamplerResult) -> &[Point]| {
         let mut all: Vec<f64> = result.samplers.iter().flat_map(points).map(|p| p.at).collect();
         all.sort_by(f64::total_cmp);
@@ -85,10 +108,7 @@ fn errors_table(result: &SceneResult) -> String {
         .collect();
     let cell = |points: &[Point], at: f64| {
         let point = points.iter().find(|point| point.at == at);
-        point.map_or("-".into(), |point| {
-            let mark = if point.is_noise() { "~" } else { "" };
-            format!("{mark}{}", number(point.relmse_trimmed))
-        })
+        point.map_or("-".into(), &show)
     };
     let row = |s: &SamplerResult| {
         let last = s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed_se);

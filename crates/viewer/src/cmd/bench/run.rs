@@ -5,7 +5,7 @@ use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::session;
 use anyhow::Result;
-use render::{FrameLoop, ImageError, Method, Settings};
+use render::{Choosing, FrameLoop, ImageError, Method, Settings};
 use scene::{Camera, Scene};
 use std::time::Instant;
 
@@ -31,6 +31,8 @@ pub(super) struct Run {
     pub(super) light_build_s: f64,
     /// Seconds of learning, part of the frames.
     pub(super) learn_s: f64,
+    /// What choosing lights cost after the last frame; `None` for methods without a choice.
+    pub(super) choosing: Option<Choosing>,
     /// All frames.
     pub(super) frames: Vec<Frame>,
 }
@@ -38,7 +40,7 @@ pub(super) struct Run {
 /// A run that is not finished.
 struct Active<'s> {
     run: Run,
-    renderer: Box<dyn FrameLoop + 's>,
+    renderer: Box<dyn FrameLoop<'s> + 's>,
     elapsed_s: f64,
     /// The next of the times to be measured at.
     next_time: usize,
@@ -81,6 +83,16 @@ impl Run {
         Ok(active.into_iter().map(Active::finish).collect())
     }
 
+    /// Parts of the frames' time that went into learning and into choosing.
+    pub(super) fn shares(&self) -> (f64, Option<f64>) {
+        let seconds = self.frames.iter().map(|frame| frame.frame_ms * 1e-3).sum::<f64>();
+        let frame_s = seconds / self.frames.len().max(1) as f64;
+        let choose = self
+            .choosing
+            .map(|choosing| choosing.share(frame_s, rayon::current_num_threads()));
+        (self.learn_s / seconds.max(f64::MIN_POSITIVE), choose)
+    }
+
     /// The measured state at `time`: the first at or after it, if the run came so far.
     pub(super) fn at_time(&self, time: f64) -> Option<&Frame> {
         self.frames
@@ -103,6 +115,7 @@ impl<'s> Active<'s> {
                 seed: settings.seed,
                 light_build_s,
                 learn_s: 0.0,
+                choosing: None,
                 frames: Vec::new(),
             },
             renderer,
@@ -137,6 +150,7 @@ impl<'s> Active<'s> {
     }
 
     fn finish(mut self) -> Run {
+        self.run.choosing = self.renderer.choosing();
         self.run.learn_s = self.renderer.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
         self.run
     }

@@ -54,6 +54,13 @@ pub(super) struct SamplerResult {
     pub(super) light_build_s: f64,
     /// Seconds of learning, median.
     pub(super) learn_s: f64,
+    /// Part of the frames' time that went into learning, median.
+    pub(super) learn_share: f64,
+    /// Part of the frames' time that went into choosing lights (timed after the last frame), median; `None` for methods
+    /// without a choice, or where it is not counted.
+    pub(super) choose_share: Option<f64>,
+    /// What must be said of this method, if anything: it is for research.
+    pub(super) research: Option<&'static str>,
     /// Errors at equal time.
     pub(super) at_time: Vec<Point>,
     /// Errors at equal numbers of frames.
@@ -62,7 +69,9 @@ pub(super) struct SamplerResult {
     pub(super) efficiency: Option<f64>,
     /// Efficiency over that of `uniform`.
     pub(super) to_uniform: Option<f64>,
-    /// Efficiency over that of the best other sampler.
+    /// Efficiency over that of `tree`.
+    pub(super) to_tree: Option<f64>,
+    /// Efficiency over that of the best other sampler, those for research left out.
     pub(super) to_best_other: Option<f64>,
 }
 
@@ -83,6 +92,9 @@ pub(super) struct Point {
     pub(super) relmse_trimmed_se: f64,
     /// relMSE over all pixels.
     pub(super) relmse: f64,
+    /// At equal numbers of frames, `relmse_trimmed` over that of `oracle`; `None` without it, or where one of the two
+    /// cannot be told from 0.
+    pub(super) to_oracle: Option<f64>,
     /// 1 / (`relmse_trimmed` x `elapsed_s`); `None` where the error is not above 0: lost in the reference's noise.
     pub(super) efficiency: Option<f64>,
 }
@@ -107,17 +119,19 @@ impl SceneResult {
             let point = sampler.at_time.iter().find(|point| Some(point.at) == efficiency_at_s);
             sampler.efficiency = point.and_then(|point| point.efficiency);
         }
-        let efficiencies: Vec<Option<f64>> = samplers.iter().map(|s| s.efficiency).collect();
-        let uniform = samplers
+        let rivals: Vec<Option<f64>> = samplers
             .iter()
-            .find(|s| s.sampler == "uniform")
-            .and_then(|s| s.efficiency);
+            .map(|s| s.efficiency.filter(|_| s.research.is_none()))
+            .collect();
+        let of_sampler = |name: &str| samplers.iter().find(|s| s.sampler == name).and_then(|s| s.efficiency);
+        let (uniform, tree) = (of_sampler("uniform"), of_sampler("tree"));
         for (index, sampler) in samplers.iter_mut().enumerate() {
-            let others = efficiencies.iter().enumerate().filter(|(i, _)| *i != index);
+            let others = rivals.iter().enumerate().filter(|(i, _)| *i != index);
             let best = others.filter_map(|(_, e)| *e).max_by(f64::total_cmp);
             let over = |other: Option<f64>| Some(sampler.efficiency? / other?);
-            (sampler.to_uniform, sampler.to_best_other) = (over(uniform), over(best));
+            (sampler.to_uniform, sampler.to_tree, sampler.to_best_other) = (over(uniform), over(tree), over(best));
         }
+        compare_to_oracle(&mut samplers);
         Self {
             what: loaded.what.clone(),
             name: loaded.scene.parts.name.clone(),
@@ -130,6 +144,26 @@ impl SceneResult {
             samplers,
             runs,
         }
+    }
+}
+
+/// Fills in [`Point::to_oracle`].
+fn compare_to_oracle(samplers: &mut [SamplerResult]) {
+    let oracle = samplers.iter().find(|s| s.sampler == Method::Oracle.name());
+    let told = |points: &[Point]| -> Vec<(f64, f64)> {
+        let points = points.iter().filter(|p| !p.is_noise());
+        points.map(|p| (p.at, p.relmse_trimmed)).collect()
+    };
+    let Some(best) = oracle.map(|s| told(&s.at_frames)) else {
+        return;
+    };
+    for point in samplers
+        .iter_mut()
+        .flat_map(|s| &mut s.at_frames)
+        .filter(|p| !p.is_noise())
+    {
+        let same = best.iter().find(|(at, _)| *at == point.at);
+        point.to_oracle = same.map(|(_, error)| point.relmse_trimmed / error);
     }
 }
 
@@ -155,6 +189,9 @@ impl SamplerResult {
             frame_ms_max: quantile(&frame_ms, 1.0),
             light_build_s: median(runs.iter().map(|run| run.light_build_s).collect()).unwrap_or(0.0),
             learn_s: median(runs.iter().map(|run| run.learn_s).collect()).unwrap_or(0.0),
+            learn_share: median(runs.iter().map(|run| run.shares().0).collect()).unwrap_or(0.0),
+            choose_share: median(runs.iter().filter_map(|run| run.shares().1).collect()),
+            research: method.research_note(),
             at_time: times
                 .iter()
                 .filter_map(|&time| Point::new(time, runs, |run| run.at_time(time)))
@@ -164,6 +201,7 @@ impl SamplerResult {
                 .collect(),
             efficiency: None,
             to_uniform: None,
+            to_tree: None,
             to_best_other: None,
         }
     }
@@ -196,6 +234,7 @@ impl Point {
             relmse_trimmed_max: quantile(&trimmed, 1.0),
             relmse_trimmed_se: quantile(&errors(|error| error.relmse_trimmed_se), 0.5),
             relmse: quantile(&errors(|error| error.relmse), 0.5),
+            to_oracle: None,
             efficiency: (relmse_trimmed > 0.0).then(|| 1.0 / (relmse_trimmed * elapsed_s)),
         })
     }
@@ -206,13 +245,13 @@ impl Point {
     }
 }
 
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     (!values.is_empty()).then(|| quantile(&values, 0.5))
 }
 
 /// The value below which a share `q` of the sorted `values` lies, interpolated; NaN if there are none.
-fn quantile(values: &[f64], q: f64) -> f64 {
+pub(super) fn quantile(values: &[f64], q: f64) -> f64 {
     let Some(last) = values.len().checked_sub(1) else {
         return f64::NAN;
     };

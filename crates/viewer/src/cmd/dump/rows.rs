@@ -1,12 +1,15 @@
-//! The rows of the table.
+//! A row per light.
 
+use super::write::{Columns, Row};
+use anyhow::Result;
 use light_cache::LightRecord;
 use scene::{LightKind, Scene};
 use serde::Serialize;
+use std::io::Write;
 
 /// One light. Field names are column names, in this order.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct Row {
+pub(super) struct LightRow {
     /// Index of the light.
     pub(super) light: u64,
     /// Name that a person recognises.
@@ -45,8 +48,73 @@ pub(super) struct Row {
     pub(super) triangle: u64,
 }
 
+impl Row for LightRow {
+    const HEADER: &'static [&'static str] = &[
+        "light",
+        "name",
+        "kind",
+        "x_m",
+        "y_m",
+        "z_m",
+        "area_m2",
+        "power_w",
+        "max_contribution",
+        "mean_contribution",
+        "visible_fraction",
+        "samples",
+        "probability",
+        "min_probability",
+        "node",
+        "mesh",
+        "material",
+        "triangle",
+    ];
+
+    const SCHEMA: &'static str = "message lights {
+        required int64 light;
+        required binary name (UTF8);
+        required binary kind (UTF8);
+        optional float x_m;
+        optional float y_m;
+        optional float z_m;
+        required float area_m2;
+        required float power_w;
+        required double max_contribution;
+        required double mean_contribution;
+        optional double visible_fraction;
+        required int64 samples;
+        required double probability;
+        required double min_probability;
+        required binary node (UTF8);
+        required binary mesh (UTF8);
+        required binary material (UTF8);
+        required int64 triangle;
+    }";
+
+    fn columns<W: Write + Send>(columns: &mut Columns<'_, '_, W, Self>) -> Result<()> {
+        columns.integers(|row| row.light)?;
+        columns.texts(|row| &row.name)?;
+        columns.texts(|row| kind_name(row.kind))?;
+        columns.floats(|row| row.x_m, false)?;
+        columns.floats(|row| row.y_m, false)?;
+        columns.floats(|row| row.z_m, false)?;
+        columns.floats(|row| Some(row.area_m2), true)?;
+        columns.floats(|row| Some(row.power_w), true)?;
+        columns.doubles(|row| Some(row.max_contribution), true)?;
+        columns.doubles(|row| Some(row.mean_contribution), true)?;
+        columns.doubles(|row| row.visible_fraction, false)?;
+        columns.integers(|row| row.samples)?;
+        columns.doubles(|row| Some(row.probability), true)?;
+        columns.doubles(|row| Some(row.min_probability), true)?;
+        columns.texts(|row| &row.node)?;
+        columns.texts(|row| &row.mesh)?;
+        columns.texts(|row| &row.material)?;
+        columns.integers(|row| row.triangle)
+    }
+}
+
 /// Joins the lights with what is known about them: all in their order, or the `top` most probable ones.
-pub(super) fn collect(scene: &Scene, records: &[LightRecord], top: Option<usize>) -> Vec<Row> {
+pub(super) fn collect(scene: &Scene, records: &[LightRecord], top: Option<usize>) -> Vec<LightRow> {
     let mut order: Vec<usize> = (0..scene.lights.len().min(records.len())).collect();
     if let Some(top) = top {
         order.sort_by(|&a, &b| records[b].probability.total_cmp(&records[a].probability));
@@ -58,14 +126,14 @@ pub(super) fn collect(scene: &Scene, records: &[LightRecord], top: Option<usize>
         .collect()
 }
 
-fn row(scene: &Scene, index: usize, record: &LightRecord) -> Row {
+fn row(scene: &Scene, index: usize, record: &LightRecord) -> LightRow {
     let light = &scene.lights[index];
     let source = scene.light_source(index as u32);
     let place = (light.kind != LightKind::Directional).then(|| light.center_ws());
     let named = [&source.node, &source.mesh, &source.material]
         .into_iter()
         .find(|name| !name.is_empty());
-    Row {
+    LightRow {
         light: index as u64,
         name: named.cloned().unwrap_or_else(|| format!("light {index}")),
         kind: light.kind,
@@ -88,7 +156,7 @@ fn row(scene: &Scene, index: usize, record: &LightRecord) -> Row {
 }
 
 /// The name of a kind, as serde writes it.
-pub(super) fn kind_name(kind: LightKind) -> &'static str {
+fn kind_name(kind: LightKind) -> &'static str {
     match kind {
         LightKind::Triangle => "triangle",
         LightKind::Point => "point",

@@ -2,7 +2,7 @@
 
 use crate::machine;
 use crate::session::Loaded;
-use render::{RenderStats, Settings};
+use render::{Choosing, RenderStats, Settings};
 use scene::{Report, Scene};
 use serde::Serialize;
 
@@ -29,9 +29,17 @@ pub(super) struct Stats {
     load_s: f64,
     build_s: f64,
     light_build_s: f64,
+    /// Seconds in which `oracle` found out what is best; part of no other figure.
+    prepare_s: f64,
     /// Seconds of rendering, learning included.
     pub(super) render_s: f64,
     learn_s: f64,
+    /// Part of the rendering time that went into learning.
+    learn_share: f64,
+    /// What choosing lights cost, timed after the rendering; `None` for methods without a choice.
+    choosing: Option<Choosing>,
+    /// Part of the rendering time that went into choosing.
+    choose_share: Option<f64>,
     lights: usize,
     triangles: u64,
     rays_nearest: u64,
@@ -43,6 +51,8 @@ pub(super) struct Stats {
     bvh_bytes: usize,
     peak_rss_bytes: u64,
     skipped: Vec<String>,
+    /// What must be said of results of this method, if anything: it is for research.
+    pub(super) research: Option<&'static str>,
     /// What makes the image biased, if anything does.
     pub(super) biased: Option<String>,
     settings: Settings,
@@ -56,8 +66,11 @@ impl Stats {
         camera: &str,
         settings: &Settings,
         run: &RenderStats,
+        choosing: Option<Choosing>,
         interrupted: bool,
     ) -> Self {
+        let threads = rayon::current_num_threads();
+        let frame_s = run.render_s / run.frames.max(1) as f64;
         let sampler = run.sampler.clone().unwrap_or_default();
         // The flag follows the setting, also where the sampler at hand has no use for it and says nothing.
         let asked = settings.light.ignore_below > 0.0;
@@ -73,13 +86,17 @@ impl Stats {
             max_bounces: settings.max_bounces,
             spp: run.frames,
             seed: settings.seed,
-            threads: rayon::current_num_threads(),
+            threads,
             interrupted,
             load_s: loaded.load_s,
             build_s: loaded.scene.build_s,
             light_build_s: run.light_build_s,
+            prepare_s: run.prepare_s,
             render_s: run.render_s,
             learn_s: sampler.learn_s,
+            learn_share: sampler.learn_s / run.render_s.max(f64::MIN_POSITIVE),
+            choosing,
+            choose_share: choosing.map(|choosing| choosing.share(frame_s, threads)),
             lights: loaded.scene.lights.len(),
             triangles: loaded.scene.triangle_count(),
             rays_nearest: run.rays_nearest,
@@ -91,6 +108,7 @@ impl Stats {
             bvh_bytes: loaded.scene.bvh().bytes(),
             peak_rss_bytes: machine::peak_rss_bytes(),
             skipped: skipped(&loaded.scene, run),
+            research: settings.method.research_note(),
             biased: sampler.biased.or_else(by_setting),
             settings: settings.clone(),
             report: loaded.scene.parts.report.clone(),
