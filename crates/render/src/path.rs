@@ -159,6 +159,7 @@ pub(crate) struct Start {
 
 impl Starts {
     /// In the pixels of row `y` from column `x` on. Those beyond the image's edge are of no use, and harmless.
+    #[allow(clippy::needless_range_loop, reason = "pixels are the inner index of what the outer loop fills")]
     #[inline(always)]
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let first_pixel = y * view.image_width + x;

@@ -85,6 +85,7 @@ impl VertexSequence {
 /// The first `D` dimensions of the first vertex (`PixelSequence::vertex(0)`) for `N` pixels that follow each other,
 /// 32 bits each, at one sample number. All pixels share the point and differ in its scramble, so there is nothing to look
 /// up per pixel, and the compiler takes several pixels at a time.
+#[allow(clippy::needless_range_loop, reason = "pixels are the inner index of what the outer loop fills")]
 #[inline(always)]
 pub fn first_vertices<const D: usize, const N: usize>(seed: u64, first_pixel: u32, sample: u32) -> [[u32; N]; D] {
     let points: [u32; D] = std::array::from_fn(|d| reversed_sobol(sample.reverse_bits(), d as u32));

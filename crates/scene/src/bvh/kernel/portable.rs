@@ -76,7 +76,7 @@ impl Instructions for Portable {
     #[inline(always)]
     unsafe fn boxes_at(planes: &Planes, inverse: [f32; 3], inverse_far: [f32; 3], t_max: f32, near: &mut Lanes) -> u32 {
         let mut mask = 0;
-        for lane in 0..WIDTH {
+        for (lane, near) in near.iter_mut().enumerate() {
             let (mut enter, mut leave) = (0.0, t_max);
             for axis in 0..3 {
                 let t_near = planes.near[axis][lane] * inverse[axis];
@@ -85,7 +85,7 @@ impl Instructions for Portable {
                 leave = if t_far < leave { t_far } else { leave };
             }
             let meets = enter <= leave;
-            near[lane] = if meets && enter < near[lane] { enter } else { near[lane] };
+            *near = if meets && enter < *near { enter } else { *near };
             mask |= u32::from(meets) << lane;
         }
         mask
