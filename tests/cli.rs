@@ -355,10 +355,10 @@ fn a_reader_that_leaves_early_is_no_error() {
 fn pipes_stay_pipes_and_links_stay_links() {
     let temporary = folder();
     let folder = temporary.path();
-    let pipe = folder.join("pipe.exr");
+    let pipe = folder.join("pipe.png");
     assert!(Command::new("mkfifo").arg(&pipe).status().expect("mkfifo").success());
-    std::os::unix::fs::symlink("pipe.exr", folder.join("to-pipe.exr")).expect("a link");
-    std::os::unix::fs::symlink("image.exr", folder.join("to-image.exr")).expect("a link");
+    std::os::unix::fs::symlink("pipe.png", folder.join("to-pipe.png")).expect("a link");
+    std::os::unix::fs::symlink("image.png", folder.join("to-image.png")).expect("a link");
     let image = |output: &str| {
         let arguments = ["render", "demo:one-light", "--width=8", "--spp=1", "-o", output];
         let output = manylight(folder, &arguments);
@@ -366,17 +366,17 @@ fn pipes_stay_pipes_and_links_stay_links() {
     };
     let piped = std::thread::scope(|scope| {
         let reader = scope.spawn(|| std::fs::read(&pipe).expect("the pipe's other end"));
-        image("to-pipe.exr");
+        image("to-pipe.png");
         reader.join().expect("all was read")
     });
-    image("to-image.exr");
+    image("to-image.png");
     assert_eq!(
         piped,
-        std::fs::read(folder.join("image.exr")).expect("where the link points")
+        std::fs::read(folder.join("image.png")).expect("where the link points")
     );
     use std::os::unix::fs::FileTypeExt;
     assert!(pipe.metadata().expect("still there").file_type().is_fifo());
-    assert!(folder.join("to-image.exr").is_symlink() && folder.join("to-pipe.exr").is_symlink());
+    assert!(folder.join("to-image.png").is_symlink() && folder.join("to-pipe.png").is_symlink());
 }
 
 #[test]

@@ -18,6 +18,7 @@ use plan::Plan;
 use render::{Method, Settings};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::Path;
 use std::time::Instant;
 
@@ -149,12 +150,12 @@ fn references(
 ) -> Result<Option<BTreeMap<(usize, usize), Reference>>> {
     let mut references = BTreeMap::new();
     for &(state, view) in &plan.frames {
-        if !references.contains_key(&(state, view)) {
+        if let Entry::Vacant(missing) = references.entry((state, view)) {
             let (scene, camera) = (&plan.states[state], &plan.views[view]);
             let Some(reference) = Reference::get(scene, camera, settings, spp, cache, watch)? else {
                 return Ok(None);
             };
-            references.insert((state, view), reference);
+            missing.insert(reference);
         }
     }
     Ok(Some(references))

@@ -157,7 +157,7 @@ mod tests {
     #[test]
     fn ranges_double_and_cover_everything() {
         assert_eq!(ranges(6), [0..1, 1..2, 2..4, 4..6]);
-        assert_eq!(ranges(1), [0..1]);
+        assert_eq!(ranges(3), [0..1, 1..2, 2..3]);
         assert!(ranges(0).is_empty());
     }
 }
