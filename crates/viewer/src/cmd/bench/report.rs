@@ -21,7 +21,7 @@ pub(super) fn table(result: &SceneResult) -> String {
         times_table(result)
     );
     text += "relMSE without the worst 0.1 % of the pixels, +- one standard error of the last:\n";
-    text += &errors_table(result, |point| {
+    text += &errors_table(result, true, |point| {
         let mark = if point.is_noise() { "~" } else { "" };
         format!("{mark}{}", number(point.relmse_trimmed))
     });
@@ -31,14 +31,14 @@ pub(super) fn table(result: &SceneResult) -> String {
     let seeds = result.samplers.iter().map(|s| s.seeds).max().unwrap_or(0);
     if seeds > 1 {
         text += &format!("the same, least to largest over {seeds} seeds:\n");
-        text += &errors_table(result, |point| {
+        text += &errors_table(result, false, |point| {
             let ends = [point.relmse_trimmed_min, point.relmse_trimmed_max];
             ends.map(number).join(" to ")
         });
     }
     if all_points(result).any(|point| point.to_oracle.is_some()) {
         text += "the same as a multiple of that of oracle:\n";
-        text += &errors_table(result, |point| number(point.to_oracle.unwrap_or(f64::NAN)));
+        text += &errors_table(result, false, |point| number(point.to_oracle.unwrap_or(f64::NAN)));
     }
     for sampler in &result.samplers {
         if let Some(note) = sampler.research {
@@ -91,7 +91,9 @@ fn times_table(result: &SceneResult) -> String {
 }
 
 /// What `show` tells of the errors after 1, 4, 16 ... frames and at the times asked for.
-fn errors_table(result: &SceneResult, show: impl Fn(&Point) -> String) -> String {
+///
+/// With `noise`, a further column tells the standard error of the last.
+fn errors_table(result: &SceneResult, noise: bool, show: impl Fn(&Point) -> String) -> String {
     let moments = |points: fn(&SamplerResult) -> &[Point]| {
         let mut all: Vec<f64> = result.samplers.iter().flat_map(points).map(|p| p.at).collect();
         all.sort_by(f64::total_cmp);
@@ -104,18 +106,17 @@ fn errors_table(result: &SceneResult, show: impl Fn(&Point) -> String) -> String
     let header: Vec<String> = std::iter::once("sampler".into())
         .chain(frames.iter().map(|count| format!("{count} spp")))
         .chain(times.iter().map(|time| format!("{time} s")))
-        .chain(["+-".into()])
+        .chain(noise.then(|| "+-".into()))
         .collect();
     let cell = |points: &[Point], at: f64| {
         let point = points.iter().find(|point| point.at == at);
         point.map_or("-".into(), &show)
     };
     let row = |s: &SamplerResult| {
-        let last = s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed_se);
         std::iter::once(s.sampler.to_string())
             .chain(frames.iter().map(|&at| cell(&s.at_frames, at)))
             .chain(times.iter().map(|&at| cell(&s.at_time, at)))
-            .chain([number(last)])
+            .chain(noise.then(|| number(s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed_se))))
             .collect()
     };
     let header: Vec<&str> = header.iter().map(String::as_str).collect();

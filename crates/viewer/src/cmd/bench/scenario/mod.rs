@@ -46,9 +46,6 @@ impl Scenario {
 
 /// How much larger than its later, steady value the error may be for a change to count as learned.
 const LEARNED: f64 = 1.2;
-/// Frames over which the error is smoothed by its median before it is compared: one lucky frame does not count.
-const SMOOTHED: usize = 3;
-
 /// One frame.
 #[derive(Clone, Copy, Debug)]
 struct Step {
@@ -224,11 +221,13 @@ impl Curve {
     }
 }
 
-/// The first frame, counted from 1, from which on the smoothed error is within reach of the steady one.
+/// The first frame, counted from 1, at which the error is within reach of the steady one. It is smoothed by the median of
+/// three frames in a row: one lucky frame does not count.
 fn learned_after(errors: &[f64], steady: f64) -> Option<usize> {
-    let smoothed = errors.windows(SMOOTHED).map(|some| median(some.to_vec()));
-    let mut within = smoothed.map(|error| error.is_some_and(|error| error <= LEARNED * steady));
-    within.position(|within| within).map(|frame| frame + 1)
+    let last = errors.len().checked_sub(1)?;
+    let smoothed = |at: usize| median(errors[at.saturating_sub(1)..=(at + 1).min(last)].to_vec());
+    let within = |at: &usize| smoothed(*at).is_some_and(|error| error <= LEARNED * steady);
+    (0..=last).find(within).map(|at| at + 1)
 }
 
 #[cfg(test)]
@@ -240,5 +239,6 @@ mod tests {
         assert_eq!(learned_after(&[9.0, 1.0, 8.0, 7.0, 1.1, 0.9, 1.0, 1.0], 1.0), Some(5));
         assert_eq!(learned_after(&[1.0, 1.0, 1.0], 1.0), Some(1));
         assert_eq!(learned_after(&[9.0, 9.0, 9.0], 1.0), None);
+        assert_eq!(learned_after(&[], 1.0), None);
     }
 }
