@@ -40,6 +40,8 @@ pub struct TableSampler {
     brightness: Brightness,
     /// Cell of each observation of the frame that is learned from; kept for its memory only.
     cells: Vec<u16>,
+    /// Whether the prior is trusted as much as ever allowed.
+    cautious: bool,
     settings: Settings,
     /// Which frames are learned from.
     schedule: Schedule,
@@ -78,6 +80,16 @@ struct Table {
 impl TableSampler {
     /// The table over `lights`, which starts as their power. `radius` of the scene, metres.
     pub fn new(lights: &[Light], radius: f32, settings: &Settings) -> Self {
+        Self::with_caution(lights, radius, settings, false)
+    }
+
+    /// As the net under a sampler that learns more: lights that were not seen keep much of their prior, whatever the
+    /// others say.
+    pub(crate) fn net(lights: &[Light], radius: f32, settings: &Settings) -> Self {
+        Self::with_caution(lights, radius, settings, true)
+    }
+
+    fn with_caution(lights: &[Light], radius: f32, settings: &Settings, cautious: bool) -> Self {
         let start = Instant::now();
         let strongest = lights.iter().map(|light| light.power).fold(f32::MIN_POSITIVE, f32::max);
         let prior: Vec<f64> = lights
@@ -91,6 +103,7 @@ impl TableSampler {
             prior,
             brightness: Brightness::new(radius),
             cells: Vec::new(),
+            cautious,
             settings: settings.clone(),
             schedule: Schedule::default(),
             frame: 0,
@@ -128,7 +141,7 @@ impl TableSampler {
             table.observe(observation, brightness, self.frame, self.settings.table_decay);
         }
         for table in [Some(&mut self.primary), self.secondary.as_mut()].into_iter().flatten() {
-            table.refresh(&self.prior, self.frame, &self.settings);
+            table.refresh(&self.prior, self.frame, &self.settings, self.cautious);
         }
         self.learn_s += start.elapsed().as_secs_f64();
     }
@@ -171,7 +184,7 @@ impl Table {
     }
 
     /// Makes the distribution anew if enough has been observed to pay for the pass over all lights.
-    fn refresh(&mut self, prior: &[f64], frame: u32, settings: &Settings) {
+    fn refresh(&mut self, prior: &[f64], frame: u32, settings: &Settings, cautious: bool) {
         if self.fresh == 0 || self.fresh < self.entries.len() / 4 {
             return;
         }
@@ -180,7 +193,11 @@ impl Table {
         };
         self.fresh = 0;
         let scale_sq = scale_sq(&self.entries, prior);
-        let prior_samples = prior_samples(&self.entries);
+        let prior_samples = if cautious {
+            MAX_PRIOR_SAMPLES
+        } else {
+            prior_samples(&self.entries)
+        };
         self.weights.clear();
         for (entry, prior) in self.entries.iter_mut().zip(prior) {
             if entry.samples > MEMORY {

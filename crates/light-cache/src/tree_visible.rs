@@ -47,10 +47,19 @@ pub struct Local<'t> {
 impl TreeVisibleSampler {
     /// Builds the tree over `lights`; nothing is known of visibility yet.
     pub fn new(lights: &[Light], settings: &Settings) -> Self {
+        Self::with_caution(lights, settings, false)
+    }
+
+    /// As the prior of a sampler that learns more.
+    pub(crate) fn prior(lights: &[Light], settings: &Settings) -> Self {
+        Self::with_caution(lights, settings, true)
+    }
+
+    fn with_caution(lights: &[Light], settings: &Settings, cautious: bool) -> Self {
         let start = Instant::now();
         let tree = Tree::new(lights);
         Self {
-            visibility: Visibility::new(&tree),
+            visibility: Visibility::new(&tree, cautious),
             floor: Floor::new(settings.min_probability_mass, lights.len()),
             schedule: Schedule::default(),
             fresh: 0,

@@ -1,6 +1,6 @@
 //! What an entry of a cut stands for: a node of the light tree, one light, or all lights at infinity.
 
-use crate::tree::{LEAF, MAX_LEAF_LIGHTS, Receiver, Tree};
+use crate::tree::{LEAF, MAX_LEAF_LIGHTS, Tree};
 
 /// A part of the light tree, in 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,7 +15,8 @@ impl Branch {
     /// The whole tree.
     pub(super) const ROOT: Self = Self(0);
 
-    fn node_or_light(tree: &Tree, node: u32) -> Self {
+    /// The branch that tree node `node` is.
+    pub(super) fn of_node(tree: &Tree, node: u32) -> Self {
         let n = &tree.nodes[node as usize];
         if n.count == 1 {
             Self(LIGHT | n.first)
@@ -56,8 +57,8 @@ impl Branch {
             }
             (children, node.count as usize)
         } else {
-            children[0] = Self::node_or_light(tree, node.child);
-            children[1] = Self::node_or_light(tree, node.child + 1);
+            children[0] = Self::of_node(tree, node.child);
+            children[1] = Self::of_node(tree, node.child + 1);
             (children, 2)
         }
     }
@@ -78,19 +79,5 @@ impl Branch {
                 .find(|child| child.first(tree) <= place)?;
         }
         parent
-    }
-
-    /// What the tree thinks it is worth at a point: irradiance in units of the strongest light, with what was learned
-    /// about visibility over the whole image.
-    pub(super) fn importance(self, tree: &Tree, at: &Receiver) -> f32 {
-        match (self.light(), self.node()) {
-            (Some(place), _) => at.light(&tree.leaves[place as usize]),
-            (_, Some(node)) => at.group(&tree.nodes[node as usize]),
-            _ => tree
-                .distant
-                .iter()
-                .map(|d| d.weight * (-at.normal.dot(d.direction)).max(0.0))
-                .sum(),
-        }
     }
 }

@@ -1,6 +1,6 @@
 //! All cells: which observation belongs to which, and making and splitting them.
 
-use super::cell::{Cell, FirstMass};
+use super::cell::Cell;
 use super::grid::{Grid, NO_CELL, Place};
 use crate::tree::{Receiver, Tree};
 use crate::{Observation, ShadingPoint};
@@ -15,18 +15,16 @@ const MAX_CELLS: usize = 1 << 17;
 pub(super) struct Cells {
     grid: Grid,
     cells: Vec<Cell>,
-    first_mass: FirstMass,
     /// Luminance of the irradiance that is 1 in the tree's importance.
     unit: f32,
 }
 
 impl Cells {
     /// No cells yet, for a scene in the given sphere.
-    pub(super) fn new(center_ws: Vec3, radius: f32, first_mass: FirstMass, unit: f32) -> Self {
+    pub(super) fn new(center_ws: Vec3, radius: f32, unit: f32) -> Self {
         Self {
             grid: Grid::new(center_ws, radius),
             cells: Vec::new(),
-            first_mass,
             unit,
         }
     }
@@ -90,10 +88,10 @@ impl Cells {
                 cell
             })
             .collect();
-        let (cells, first_mass) = (&self.cells, self.first_mass);
+        let cells = &self.cells;
         let new = seeds.par_iter().map(|seed| match cells.get(seed.parent as usize) {
-            Some(parent) => Cell::half(seed.key, parent, &seed.points, tree, first_mass),
-            None => Cell::new(seed.key, &seed.points, tree, first_mass),
+            Some(parent) => Cell::half(seed.key, parent, &seed.points, tree),
+            None => Cell::new(seed.key, &seed.points, tree),
         });
         let new: Vec<Cell> = new.collect();
         self.cells.extend(new);
@@ -122,12 +120,12 @@ impl Cells {
             by_cell[*next as usize] = Some(o);
             *next += 1;
         }
-        let (unit, first_mass) = (self.unit, self.first_mass);
+        let unit = self.unit;
         let by_cell = &by_cell;
         self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
             let range = starts[i] as usize..starts[i + 1] as usize;
             if !range.is_empty() {
-                cell.learn(tree, unit, by_cell[range].iter().flatten().copied(), first_mass);
+                cell.learn(tree, unit, by_cell[range].iter().flatten().copied());
             }
         });
         for cell in self.cells.iter_mut().filter(|cell| cell.wants_halves()) {

@@ -28,6 +28,7 @@ pub(super) struct Grid {
     eye_ws: Vec3,
     center_ws: Vec3,
     min_size: f32,
+    inverse_min_size: f32,
     slots: Vec<(u64, u32)>,
     used: usize,
 }
@@ -38,6 +39,7 @@ impl Grid {
             eye_ws: center_ws,
             center_ws,
             min_size: radius * MIN_SIZE,
+            inverse_min_size: 1.0 / (radius * MIN_SIZE).max(f32::MIN_POSITIVE),
             slots: vec![(0, NO_CELL); 1 << 10],
             used: 0,
         }
@@ -63,16 +65,14 @@ impl Grid {
     }
 
     #[inline]
-    fn key(&self, point: &ShadingPoint, level: u32) -> u64 {
-        let size = self.min_size * (1u64 << level) as f32;
-        let [x, y, z] = ((point.position_ws - self.center_ws) / size)
+    fn key(&self, spot: &Spot, level: u32) -> u64 {
+        // 2^-level, by its bits.
+        let [x, y, z] = (spot.position * f32::from_bits((127 - level) << 23))
             .to_array()
             .map(|c| u64::from(floor(c) as u32 & 0xf_ffff));
         // 3 x 20 bits of position; level, normal and kind are mixed in. Two cells that clash share a distribution:
         // that costs noise and nothing else.
-        let tag = u64::from(mix(level << 8
-            | dominant_axis(point.normal_ws) << 1
-            | u32::from(point.primary)));
+        let tag = u64::from(mix(level << 8 | spot.kind));
         (x | y << 20 | z << 40) ^ (tag << 32 | tag)
     }
 
@@ -80,23 +80,25 @@ impl Grid {
     #[inline]
     pub(super) fn locate(&self, point: &ShadingPoint) -> Place {
         let top = self.top_level(point);
-        let mut place = Place {
-            cell: NO_CELL,
-            missing: None,
+        let spot = Spot {
+            position: (point.position_ws - self.center_ws) * self.inverse_min_size,
+            kind: dominant_axis(point.normal_ws) << 1 | u32::from(point.primary),
         };
-        for level in (top.saturating_sub(MAX_HALVINGS)..=top).rev() {
-            let key = self.key(point, level);
+        // From the finest up: after a while most points are in one of the finest.
+        let mut missing = None;
+        for level in top.saturating_sub(MAX_HALVINGS)..=top {
+            let key = self.key(&spot, level);
             let value = self.find(key);
-            if value == NO_CELL {
-                place.missing = Some(key);
-                return place;
+            if value != NO_CELL {
+                let halved = value & SPLIT != 0;
+                return Place {
+                    cell: value & !SPLIT,
+                    missing: missing.filter(|_| halved),
+                };
             }
-            place.cell = value & !SPLIT;
-            if value & SPLIT == 0 {
-                return place;
-            }
+            missing = Some(key);
         }
-        place
+        Place { cell: NO_CELL, missing }
     }
 
     #[inline]
@@ -151,6 +153,14 @@ pub(super) struct Place {
     pub(super) missing: Option<u64>,
 }
 
+/// What the keys of all levels at a point have in common.
+struct Spot {
+    /// In edges of the smallest cells.
+    position: Vec3,
+    /// Side that the normal faces, first or later hit.
+    kind: u32,
+}
+
 /// The largest whole number that is not above `x`: the library's floor is a call where the target lacks the instruction.
 #[inline]
 fn floor(x: f32) -> i32 {
@@ -159,6 +169,7 @@ fn floor(x: f32) -> i32 {
 }
 
 /// 0..6: the axis, and the side of it, to which the normal is nearest.
+#[inline]
 fn dominant_axis(normal: Vec3) -> u32 {
     let a = normal.abs();
     let axis = if a.x >= a.y && a.x >= a.z {

@@ -1,20 +1,22 @@
 //! Learned cuts: the sampler that knows which lights matter where.
 //!
-//! World-space cells, hashed, each with a cut of the light tree of its own, whose entries carry the learned root second moment of
-//! their contribution, visibility included. A light is drawn in two steps: an entry by the cell's integer distribution,
-//! then, where the entry is a cluster, a light of it by the tree's descent at the point itself. A fixed share of the
+//! World-space cells, hashed, each with a cut of the light tree of its own, whose entries carry the learned ratio of what they
+//! contribute, visibility included, to what they are estimated to send. A light is drawn in two steps: an entry by the weights of all
+//! entries at the point, then, where the entry is a cluster, a light of it by the tree's descent at the point itself. A fixed share of the
 //! random numbers goes to the global importance table, which holds the guaranteed minimum of every light and every light that ever mattered
 //! anywhere in the image.
 //!
 //! Related: Pantaleoni 2019 (Importance sampling of many lights with reinforcement lightcuts learning), Wang et al. 2021 (Learning to cluster for rendering with many
-//! lights), Vevoda et al. 2018 (Bayesian online regression for adaptive direct illumination sampling). Differs: weights are second moments over all points of the cell, the cell's distribution
-//! is not evaluated point by point (a draw costs a binary search), the probability is an exact sum of integer masses,
-//! and random numbers keep their strata because entries stand in tree order.
+//! lights), Vevoda et al. 2018 (Bayesian online regression for adaptive direct illumination sampling). Differs: what is learned are ratios of second moments to an
+//! estimate that is evaluated for the whole cut at every point (with vector instructions: about the time of a shadow ray), the
+//! probability is an exact sum of integer masses, and random numbers keep their strata because entries stand in tree order.
 
 mod branch;
 mod cell;
 mod cells;
+mod emitter;
 mod grid;
+mod weights;
 
 use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
@@ -22,7 +24,7 @@ use crate::{
     Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
     TreeVisibleSampler, records,
 };
-use cell::{Cell, FirstMass};
+use cell::Cell;
 use cells::Cells;
 use glam::Vec3;
 use scene::Scene;
@@ -31,6 +33,9 @@ use std::time::Instant;
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
 const TABLE_SHARE: f64 = 0.03;
 
+/// Entries of a cell are drawn with 52 bits, which `f64` holds exactly; what is below goes to the lights within an entry.
+const CELL_SHIFT: u32 = 11;
+
 /// Learned cuts.
 #[derive(Debug)]
 pub struct AdaptiveSampler {
@@ -38,7 +43,8 @@ pub struct AdaptiveSampler {
     prior: TreeVisibleSampler,
     table: TableSampler,
     cells: Cells,
-    first_mass: FirstMass,
+    /// The table's part of 32-bit random numbers.
+    first_mass: u32,
     /// Which frames are learned from.
     schedule: Schedule,
     build_s: f64,
@@ -89,9 +95,9 @@ impl AdaptiveSampler {
         };
         let first_mass = (share * 4_294_967_296.0) as u32;
         Self {
-            prior: TreeVisibleSampler::new(lights, settings),
-            table: TableSampler::new(lights, scene.radius, &within_table),
-            cells: Cells::new(scene.center_ws, scene.radius, first_mass, Tree::unit(lights)),
+            prior: TreeVisibleSampler::prior(lights, settings),
+            table: TableSampler::net(lights, scene.radius, &within_table),
+            cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
             first_mass,
             schedule: Schedule::default(),
             build_s: start.elapsed().as_secs_f64(),
@@ -144,21 +150,18 @@ impl LightSampler for AdaptiveSampler {
             _ if x < table_width => {
                 let stretched = (u128::from(x) << 32) / u128::from(table_width);
                 let light = self.table.sample(&local.table, stretched as u32)?.light;
-                return Some(Choice {
-                    light,
-                    pmf: self.pmf(local, light),
-                });
+                let pmf = self.pmf(local, light);
+                return (pmf > 0.0).then_some(Choice { light, pmf });
             }
             Source::Tree(descent) => descent.draw(x - table_width, UNIT - table_width),
             Source::Cell(cell) => {
-                let j = cell.draw(u);
-                let (first, mass) = cell.range(j, self.first_mass);
-                let branch = cell.entries[j].branch;
-                match branch.light() {
-                    Some(place) => (place, width(mass)),
-                    None => self
-                        .inside(local)
-                        .draw_in(branch.node(), x - width(first.into()), width(mass)),
+                let x = x - table_width;
+                let whole = (UNIT - table_width) >> CELL_SHIFT;
+                let part = cell.draw(&local.receiver, x >> CELL_SHIFT, whole)?;
+                let (start, own) = (part.start << CELL_SHIFT, part.width << CELL_SHIFT);
+                match part.branch.light() {
+                    Some(place) => (place, own),
+                    None => self.inside(local).draw_in(part.branch.node(), x - start, own),
                 }
             }
         };
@@ -176,12 +179,15 @@ impl LightSampler for AdaptiveSampler {
             Source::Nothing => return 0.0,
             Source::Tree(descent) => descent.width_of(place, UNIT - width(self.first_mass.into())),
             Source::Cell(cell) => {
-                let j = cell.entry_of(place);
-                let (_, mass) = cell.range(j, self.first_mass);
-                let branch = cell.entries[j].branch;
-                match branch.light() {
-                    Some(_) => width(mass),
-                    None => self.inside(local).width_in(branch.node(), place, width(mass)),
+                let whole = (UNIT - width(self.first_mass.into())) >> CELL_SHIFT;
+                // Where nothing can arrive nothing is drawn, not by the table either.
+                let Some(part) = cell.part_of(&local.receiver, place, whole) else {
+                    return 0.0;
+                };
+                let own = part.width << CELL_SHIFT;
+                match part.branch.light() {
+                    Some(_) => own,
+                    None => self.inside(local).width_in(part.branch.node(), place, own),
                 }
             }
         };
@@ -194,9 +200,10 @@ impl LightSampler for AdaptiveSampler {
             return;
         };
         let logs = &*logs;
+        // First: what new cells believe of visibility is what the whole image has taught so far.
+        self.prior.learn(logs);
         let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
         rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), logs));
-        self.prior.learn(logs);
         self.learn_s += start.elapsed().as_secs_f64();
     }
 
@@ -263,9 +270,12 @@ mod tests {
         let sampler = learned(&scene, 8, |light| light == 7);
         let least = sampler.stats().min_probability;
         assert!(least >= 0.9 * f64::from(Settings::default().min_probability_mass) / 200.0);
+        let arrives = |light: u32, point: &ShadingPoint| {
+            scene.lights[light as usize].unshadowed_irradiance(point.position_ws, point.normal_ws) > 0.0
+        };
         for point in points(32, 9) {
             let local = sampler.local(&scene, &point);
-            for light in 0..200 {
+            for light in (0..200).filter(|&l| arrives(l, &point)) {
                 assert!(f64::from(sampler.pmf(&local, light)) >= 0.999 * least, "{light}");
             }
         }

@@ -20,6 +20,8 @@ const SPIKE: f32 = 4.0;
 /// of the tree darker with every level. Higher values keep lights that are rarely visible; lower values spend less on
 /// hidden ones.
 const MIN_PRIOR: f32 = 0.001;
+/// The same where the tree is only the prior of something that learns more: it must not give a light up.
+const CAUTIOUS_MIN_PRIOR: f32 = 0.01;
 /// No share is believed to be smaller: keeps sums over a tree within the range of `f32`.
 const MIN_VISIBLE: f32 = 1e-9;
 
@@ -32,7 +34,7 @@ struct Evidence {
 
 impl Evidence {
     fn share(self, prior: f32) -> f32 {
-        (self.visible + PRIOR_SAMPLES * prior.max(MIN_PRIOR)) / (self.samples + PRIOR_SAMPLES)
+        (self.visible + PRIOR_SAMPLES * prior) / (self.samples + PRIOR_SAMPLES)
     }
 
     fn at_most(self, samples: f32) -> Self {
@@ -75,16 +77,18 @@ pub(super) struct Visibility {
     strengths: Vec<f32>,
     /// Per node: evidence, then the believed share.
     groups: Vec<(Evidence, f32)>,
+    min_prior: f32,
 }
 
 impl Visibility {
-    /// Nothing is known yet about the lights of `tree`.
-    pub(super) fn new(tree: &Tree) -> Self {
+    /// Nothing is known yet about the lights of `tree`. `cautious`: no light is given up soon.
+    pub(super) fn new(tree: &Tree, cautious: bool) -> Self {
         let strengths = tree.leaves.iter().map(|leaf| leaf.weight);
         Self {
             seen: vec![Seen::default(); tree.len()],
             strengths: strengths.chain(tree.distant.iter().map(|light| light.weight)).collect(),
             groups: vec![(Evidence::default(), ROOT_VISIBLE); tree.nodes.len()],
+            min_prior: if cautious { CAUTIOUS_MIN_PRIOR } else { MIN_PRIOR },
         }
     }
 
@@ -133,6 +137,7 @@ impl Visibility {
             self.groups[index].0 = evidence.at_most(MAX_SAMPLES_OF_GROUP);
         }
         // Top down: each group's share, with its parent's as the prior.
+        let min_prior = self.min_prior;
         if let Some(root) = self.groups.first_mut() {
             root.1 = root.0.share(ROOT_VISIBLE);
         }
@@ -140,7 +145,7 @@ impl Visibility {
             if node.child != LEAF {
                 let prior = self.groups[index].1;
                 for child in &mut self.groups[node.child as usize..][..2] {
-                    child.1 = child.0.share(prior);
+                    child.1 = child.0.share(prior.max(min_prior));
                 }
             }
         }
@@ -148,6 +153,7 @@ impl Visibility {
             seen,
             strengths,
             groups,
+            ..
         } = self;
         // Bottom up again: the lights, then the sums.
         for index in (0..tree.nodes.len()).rev() {
@@ -156,7 +162,7 @@ impl Visibility {
                 let prior = groups[index].1;
                 (node.first as usize..(node.first + node.count) as usize)
                     .map(|place| {
-                        let weight = strengths[place] * light_factor(&seen[place], prior);
+                        let weight = strengths[place] * light_factor(&seen[place], prior.max(min_prior));
                         tree.leaves[place].weight = weight;
                         weight
                     })

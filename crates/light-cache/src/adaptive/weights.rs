@@ -1,0 +1,376 @@
+//! The weights of a cut at a point, all of them at once, and the exact probabilities made from them.
+//!
+//! Entries stand in tree order lane by lane: lane `l` holds entries `l * rows` to `(l + 1) * rows - 1`, one per row, so
+//! that rows are evaluated with vector instructions, lanes add up along the way, and a draw looks at the sums of the
+//! lanes first and then at one lane only. The arithmetic is the same on every processor (no fused multiply-add), and so
+//! are the images.
+
+use super::branch::Branch;
+use super::emitter::Emitter;
+use crate::tree::Receiver;
+use glam::Vec3;
+
+/// Entries of a row.
+const LANES: usize = 16;
+/// Rows of the longest cut.
+const MAX_ROWS: usize = super::cell::MAX_ENTRIES.div_ceil(LANES);
+
+type Lanes = [f32; LANES];
+
+/// One entry of every lane.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Row {
+    center: [Lanes; 3],
+    axis: [Lanes; 3],
+    radius: Lanes,
+    quarter_inverse_radius: Lanes,
+    depth: Lanes,
+    quarter_inverse_depth: Lanes,
+    one_sided: Lanes,
+    isotropic: Lanes,
+    weight: Lanes,
+    everywhere: Lanes,
+    branch: [Branch; LANES],
+}
+
+/// What rows with spots and lights of limited range have besides.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Attenuation {
+    cone_scale: Lanes,
+    cone_offset: Lanes,
+    inverse_range_sq: Lanes,
+}
+
+/// A cut, ready to be evaluated.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Weights {
+    rows: Vec<Row>,
+    /// Empty if no entry is attenuated.
+    attenuation: Vec<Attenuation>,
+}
+
+/// What to look for in an interval.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Wanted {
+    /// A position.
+    At(u64),
+    /// An entry of the cut.
+    Entry(usize),
+}
+
+/// An entry and its part of an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Part {
+    /// What the entry stands for.
+    pub(super) branch: Branch,
+    /// Where its part begins.
+    pub(super) start: u64,
+    /// How wide it is.
+    pub(super) width: u64,
+}
+
+impl Row {
+    #[inline(always)]
+    fn emitter(&self, lane: usize) -> Emitter {
+        Emitter {
+            center: Vec3::new(self.center[0][lane], self.center[1][lane], self.center[2][lane]),
+            axis: Vec3::new(self.axis[0][lane], self.axis[1][lane], self.axis[2][lane]),
+            radius: self.radius[lane],
+            quarter_inverse_radius: self.quarter_inverse_radius[lane],
+            depth: self.depth[lane],
+            quarter_inverse_depth: self.quarter_inverse_depth[lane],
+            one_sided: self.one_sided[lane],
+            isotropic: self.isotropic[lane],
+            weight: self.weight[lane],
+            everywhere: self.everywhere[lane],
+            ..Emitter::DARK
+        }
+    }
+}
+
+impl Weights {
+    /// The cut of `entries`, in tree order; at most as many as a cell may have.
+    pub(super) fn new(entries: &[(Branch, Emitter)]) -> Self {
+        let count = entries.len().div_ceil(LANES);
+        let mut rows = Vec::with_capacity(count);
+        let mut attenuation = Vec::new();
+        let attenuated = entries.iter().any(|(_, emitter)| emitter.is_attenuated());
+        for row in 0..count {
+            let of: [(Branch, Emitter); LANES] = std::array::from_fn(|lane| {
+                let entry = entries.get(lane * count + row).copied();
+                entry.unwrap_or((Branch::ROOT, Emitter::DARK))
+            });
+            let lanes = |value: fn(&Emitter) -> f32| of.map(|(_, emitter)| value(&emitter));
+            rows.push(Row {
+                center: [lanes(|e| e.center.x), lanes(|e| e.center.y), lanes(|e| e.center.z)],
+                axis: [lanes(|e| e.axis.x), lanes(|e| e.axis.y), lanes(|e| e.axis.z)],
+                radius: lanes(|e| e.radius),
+                quarter_inverse_radius: lanes(|e| e.quarter_inverse_radius),
+                depth: lanes(|e| e.depth),
+                quarter_inverse_depth: lanes(|e| e.quarter_inverse_depth),
+                one_sided: lanes(|e| e.one_sided),
+                isotropic: lanes(|e| e.isotropic),
+                weight: lanes(|e| e.weight),
+                everywhere: lanes(|e| e.everywhere),
+                branch: of.map(|(branch, _)| branch),
+            });
+            if attenuated {
+                attenuation.push(Attenuation {
+                    cone_scale: lanes(|e| e.cone_scale),
+                    cone_offset: lanes(|e| e.cone_offset),
+                    inverse_range_sq: lanes(|e| e.inverse_range_sq),
+                });
+            }
+        }
+        Self { rows, attenuation }
+    }
+
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> usize {
+        self.rows.capacity() * size_of::<Row>() + self.attenuation.capacity() * size_of::<Attenuation>()
+    }
+
+    /// The part that holds `wanted`, of an interval of `width`, which is at most 2^52, cut in proportion to the weights at a
+    /// point; `None` if all are zero.
+    #[cfg(target_arch = "x86_64")]
+    #[inline]
+    #[allow(unsafe_code, reason = "compiled for instructions that not every processor has")]
+    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        if is_x86_feature_detected!("avx512f")
+            && is_x86_feature_detected!("avx512vl")
+            && is_x86_feature_detected!("avx512dq")
+        {
+            // SAFETY: the processor has the instructions.
+            unsafe { self.find_avx512(receiver, wanted, width) }
+        } else if is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has the instructions.
+            unsafe { self.find_avx2(receiver, wanted, width) }
+        } else {
+            self.find_anywhere(receiver, wanted, width)
+        }
+    }
+
+    /// The same on other processors.
+    #[cfg(not(target_arch = "x86_64"))]
+    #[inline]
+    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        self.find_anywhere(receiver, wanted, width)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
+    fn find_avx512(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        self.find_anywhere(receiver, wanted, width)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn find_avx2(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        self.find_anywhere(receiver, wanted, width)
+    }
+
+    #[inline(always)]
+    fn find_anywhere(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        let (weights, lanes) = self.evaluate(receiver);
+        let cut = Cut::new(&lanes, width)?;
+        let lane = match wanted {
+            Wanted::At(x) => cut.index_at(x),
+            Wanted::Entry(entry) => entry / self.rows.len(),
+        };
+        let (lane_start, lane_width) = cut.part(lane);
+        // A lane without weight is never drawn, but its entries may be asked for.
+        let cut = Cut::new(&column(&weights, lane), lane_width);
+        let row = match (wanted, &cut) {
+            (Wanted::At(x), Some(cut)) => cut.index_at(x - lane_start),
+            (Wanted::At(_), None) => 0,
+            (Wanted::Entry(entry), _) => entry % self.rows.len(),
+        };
+        let (start, width) = cut.map_or((0, 0), |cut| cut.part(row));
+        Some(Part {
+            branch: self.rows[row].branch[lane],
+            start: lane_start + start,
+            width,
+        })
+    }
+
+    /// All weights, and the sums of the lanes.
+    #[inline(always)]
+    fn evaluate(&self, receiver: &Receiver) -> ([Lanes; MAX_ROWS], Lanes) {
+        let mut all = [[0.0; LANES]; MAX_ROWS];
+        let mut lanes = [0.0; LANES];
+        for (index, (row, weights)) in self.rows.iter().zip(&mut all).enumerate() {
+            if let Some(attenuation) = self.attenuation.get(index) {
+                for lane in 0..LANES {
+                    let emitter = Emitter {
+                        cone_scale: attenuation.cone_scale[lane],
+                        cone_offset: attenuation.cone_offset[lane],
+                        inverse_range_sq: attenuation.inverse_range_sq[lane],
+                        ..row.emitter(lane)
+                    };
+                    weights[lane] = emitter.importance::<true>(receiver);
+                    lanes[lane] += weights[lane];
+                }
+            } else {
+                for lane in 0..LANES {
+                    weights[lane] = row.emitter(lane).importance::<false>(receiver);
+                    lanes[lane] += weights[lane];
+                }
+            }
+        }
+        (all, lanes)
+    }
+}
+
+/// The weights of one lane, zeros after them.
+#[inline(always)]
+fn column(weights: &[Lanes; MAX_ROWS], lane: usize) -> Lanes {
+    std::array::from_fn(|row| if row < MAX_ROWS { weights[row][lane] } else { 0.0 })
+}
+
+/// Entries whose running sums are worked out one after the other; groups of them are worked out side by side.
+const GROUP: usize = 4;
+
+/// An interval cut in proportion to weights: part `k` begins at the ceiling of (sum of the weights before it) x scale. Parts
+/// are whole numbers that add up to the width exactly, and a weight of zero gets nothing.
+struct Cut {
+    /// Sums up to and including each weight: never falling, for adding a positive number never makes less.
+    sums: Lanes,
+    scale: f64,
+    width: u64,
+}
+
+impl Cut {
+    /// `None` if nothing weighs anything. `width` is at most 2^52, so that `f64` holds every position.
+    #[inline(always)]
+    fn new(weights: &Lanes, width: u64) -> Option<Self> {
+        let mut sums = *weights;
+        for i in 1..GROUP {
+            for group in (0..LANES).step_by(GROUP) {
+                sums[group + i] += sums[group + i - 1];
+            }
+        }
+        let mut before = 0.0;
+        for group in (0..LANES).step_by(GROUP) {
+            for i in 0..GROUP {
+                sums[group + i] += before;
+            }
+            before = sums[group + GROUP - 1];
+        }
+        (before > 0.0).then(|| Self {
+            sums,
+            scale: width as f64 / f64::from(before),
+            width,
+        })
+    }
+
+    /// Where the part after weight `index` begins.
+    #[inline(always)]
+    fn end(&self, index: usize) -> u64 {
+        if self.sums[index] >= self.sums[LANES - 1] {
+            return self.width;
+        }
+        let boundary = f64::from(self.sums[index]) * self.scale;
+        let below = boundary as u64;
+        // The library's ceiling is a call where the target lacks the instruction.
+        (below + u64::from((below as f64) < boundary)).min(self.width)
+    }
+
+    /// Start and width of a part.
+    #[inline(always)]
+    fn part(&self, index: usize) -> (u64, u64) {
+        let start = if index == 0 { 0 } else { self.end(index - 1) };
+        (start, self.end(index) - start)
+    }
+
+    /// The part that holds `x`, which is less than the width.
+    #[inline(always)]
+    fn index_at(&self, x: u64) -> usize {
+        let (x, total) = (x as f64, self.sums[LANES - 1]);
+        // A whole number has passed a boundary if and only if it has passed the boundary's ceiling.
+        let passed = |&sum: &f32| u32::from(sum < total) & u32::from(f64::from(sum) * self.scale <= x);
+        self.sums.iter().map(passed).sum::<u32>() as usize
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{mixed_lights, points};
+    use crate::tree::Tree;
+
+    const WIDTH: u64 = (1 << 52) - 12_345;
+
+    #[test]
+    fn parts_are_as_drawn_and_fill_the_interval() {
+        let random = |i: u32| sampling::Random::new(3, i, 0);
+        for round in 0..2000 {
+            // From 30 decades to nearly alike, zeros among them, at the ends too.
+            let decades = random(round).f32(0) * 30.0;
+            let weights: Lanes = std::array::from_fn(|lane| {
+                let number = random(round).f32(1 + lane as u32);
+                if number < 0.2 {
+                    0.0
+                } else {
+                    10.0_f32.powf(decades * (number - 0.6))
+                }
+            });
+            let Some(cut) = Cut::new(&weights, WIDTH) else {
+                assert_eq!(weights, [0.0; LANES]);
+                continue;
+            };
+            let total: f64 = weights.iter().copied().map(f64::from).sum();
+            let mut next = 0;
+            for (lane, &weight) in weights.iter().enumerate() {
+                let (start, width) = cut.part(lane);
+                assert_eq!(start, next);
+                next = start + width;
+                let expected = f64::from(weight) / total;
+                assert!((width as f64 / WIDTH as f64 - expected).abs() < 1e-6);
+                assert!(weight > 0.0 || width == 0);
+                if width > 0 {
+                    assert_eq!((cut.index_at(start), cut.index_at(next - 1)), (lane, lane));
+                }
+            }
+            assert_eq!(next, WIDTH);
+        }
+    }
+
+    #[test]
+    fn every_processor_finds_the_same() {
+        let tree = Tree::new(&mixed_lights(200, 3));
+        let mut entries = vec![(Branch::DISTANT, Emitter::of(&tree, Branch::DISTANT))];
+        for node in (2..tree.nodes.len() as u32)
+            .step_by(7)
+            .take(super::super::cell::MAX_ENTRIES - 1)
+        {
+            let branch = Branch::of_node(&tree, node);
+            entries.push((branch, Emitter::of(&tree, branch)));
+        }
+        let weights = Weights::new(&entries);
+        for (i, point) in (0..).zip(points(200, 5)) {
+            let receiver = Receiver::from(&point);
+            let x = sampling::Random::new(1, i, 0).u32(0);
+            for wanted in [
+                Wanted::At(u64::from(x) << 19),
+                Wanted::Entry(x as usize % entries.len()),
+            ] {
+                assert_eq!(
+                    weights.find(&receiver, wanted, WIDTH),
+                    weights.find_anywhere(&receiver, wanted, WIDTH)
+                );
+            }
+            let mut end = 0;
+            for entry in 0..entries.len() {
+                let Some(part) = weights.find(&receiver, Wanted::Entry(entry), WIDTH) else {
+                    end = WIDTH; // nothing arrives here
+                    break;
+                };
+                assert_eq!(part.start, end);
+                end += part.width;
+            }
+            assert_eq!(end, WIDTH);
+        }
+    }
+}
