@@ -17,6 +17,9 @@ pub(super) const MAX_ENTRIES: usize = 128;
 const FIRST_ENTRIES: usize = 48;
 /// How many observations the prior is worth.
 const PRIOR_COUNT: f32 = 2.0;
+/// Part of the prior that does not fade with what was learned. Higher values waste samples on hidden lights; lower values
+/// leave bright specks where a light reaches a few points of a cell only.
+const LASTING_PRIOR: f32 = 0.03;
 /// Entries of at least this share of the whole weight that are clusters are split.
 const SPLIT_SHARE: f32 = 0.5 / MAX_ENTRIES as f32;
 /// Sibling entries that together have less than this share of the whole weight may be merged.
@@ -28,8 +31,10 @@ const SPIKE: f32 = 16.0;
 const PROBES: usize = 8;
 /// Observations after which a cell is halved.
 const HALVE_AT: f32 = 400.0;
-/// How many observations a half takes over from the whole, at most.
+/// How many observations of an entry a half takes over from the whole, at most.
 const INHERITED_COUNT: f32 = 4.0;
+/// The same for entries that were never visible.
+const INHERITED_UNSEEN: f32 = 32.0;
 /// Weights are made anew when the cell has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
 
@@ -55,11 +60,11 @@ pub(super) struct Entry {
 
 impl Entry {
     /// What was learned: estimated root mean square ratio. The prior fades as 1 / n where nothing was ever visible, as it
-    /// is weighed down once for the count and once for what the count taught; the root of an unseen share would fade as
-    /// n^-1/2 and waste samples on what is hidden.
+    /// is weighed down once for the count and once for what the count taught, and in the long run as n^-1/2 with a
+    /// small constant: what was not visible so far may still be, to few points.
     fn ratio(&self) -> f32 {
         let n = self.drawn + PRIOR_COUNT;
-        let fade = PRIOR_COUNT / n;
+        let fade = PRIOR_COUNT / n + LASTING_PRIOR;
         ((self.sum_sq + PRIOR_COUNT * fade * self.prior * self.prior) / n).sqrt()
     }
 
@@ -133,14 +138,16 @@ impl Cell {
     pub(super) fn half(key: u64, parent: &Self, points: &[Receiver], tree: &Tree) -> Self {
         let mut cell = Self::empty(key, points);
         for known in &parent.entries {
-            let kept = (INHERITED_COUNT / known.drawn.max(INHERITED_COUNT)).min(1.0);
+            let seen = known.visible > 0.0;
+            let most = if seen { INHERITED_COUNT } else { INHERITED_UNSEEN };
+            let kept = most / known.drawn.max(most);
             let entry = Entry {
                 scale: cell.scale(&known.emitter(tree)),
                 drawn: known.drawn * kept,
                 visible: known.visible * kept,
                 sum_sq: known.sum_sq * kept,
                 // What was never visible stays known as such.
-                prior: known.ratio(),
+                prior: if seen { known.ratio() } else { known.prior },
                 ..*known
             };
             cell.entries.push(entry);

@@ -154,9 +154,8 @@ impl Emitter {
         let above = (front + self.depth).max(0.0);
         let part = above * above * self.quarter_inverse_depth;
         let mean_front = if front >= self.depth { front } else { part };
-        let plane = (1.0 - self.isotropic) * mean_front
-            + 0.5 * radius * (radius_sq * inverse_sq).min(1.0)
-            + self.isotropic * d;
+        let plane =
+            (1.0 - self.isotropic) * mean_front + 0.5 * radius * (radius_sq * inverse_sq).min(1.0) + self.isotropic * d;
         let lit = front > -1e-4 * radius - self.depth || self.isotropic > 0.0;
         let plane = if lit { plane } else { 0.0 };
         let mut strength = self.weight;
