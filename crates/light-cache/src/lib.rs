@@ -183,6 +183,13 @@ pub trait LightSampler: Debug + Send + Sync {
     /// light can contribute at this point.
     fn sample(&self, local: &Self::Local<'_>, u: u32) -> Option<Choice>;
 
+    /// Draws a light with each number, as [`LightSampler::sample`] does: samplers that work much out at a point do it once.
+    fn sample_each(&self, local: &Self::Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
+        for (choice, &u) in choices.iter_mut().zip(us) {
+            *choice = self.sample(local, u);
+        }
+    }
+
     /// The probability with which [`LightSampler::sample`] draws `light` here; 0 if never.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
 
@@ -191,6 +198,12 @@ pub trait LightSampler: Debug + Send + Sync {
         for (light, sum) in (0..).zip(sum) {
             *sum += f64::from(self.pmf(local, light));
         }
+    }
+
+    /// Weight of the coming frame in the image, above 0 and at most 1: frames from before anything was learned are noisier.
+    /// By a schedule that is fixed beforehand, so that it cannot bias.
+    fn frame_weight(&self) -> f32 {
+        1.0
     }
 
     /// Learns from a frame. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.

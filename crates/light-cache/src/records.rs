@@ -124,6 +124,15 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.add_pmfs(local, sum);
     }
 
+    #[inline]
+    fn sample_each(&self, local: &Self::Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
+        self.inner.sample_each(local, us, choices);
+    }
+
+    fn frame_weight(&self) -> f32 {
+        self.inner.frame_weight()
+    }
+
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.inner.set_eye(eye_ws);
     }

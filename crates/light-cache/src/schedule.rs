@@ -12,6 +12,10 @@ const LATER_STEP: u32 = 4;
 /// at any size. Higher values learn more; lower values are faster.
 const MAX_OBSERVATIONS: usize = 1 << 16;
 
+/// Frames until an image weighs a frame in full. Higher values hide more of the first frames' noise; lower values waste
+/// fewer of their samples.
+const RAMP: u32 = 4;
+
 /// Where a sampler is in the course of its learning.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Schedule {
@@ -23,6 +27,12 @@ impl Schedule {
     /// The eye has moved: what is seen is new.
     pub(crate) fn restart(&mut self) {
         self.frame = 0;
+    }
+
+    /// Weight of the coming frame in the image: the first ones teach more than they show.
+    pub(crate) fn frame_weight(self) -> f32 {
+        let grown = (self.frame + 1).min(RAMP) as f32 / RAMP as f32;
+        grown * grown
     }
 
     /// Whether the frame that is being rendered will be learned from.

@@ -308,6 +308,10 @@ impl LightSampler for TableSampler {
         self.schedule.wants_observations()
     }
 
+    fn frame_weight(&self) -> f32 {
+        self.schedule.frame_weight()
+    }
+
     fn set_eye(&mut self, _eye_ws: Vec3) {
         self.schedule.restart();
     }

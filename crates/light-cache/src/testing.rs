@@ -147,6 +147,12 @@ pub(crate) fn check<S: LightSampler>(sampler: &S, scene: &Scene, points: &[Shadi
                 observed[choice.light as usize] += 1;
             }
         }
+        let us: Vec<u32> = (0..19).map(|draw| Random::new(8, index, draw).u32(0)).collect();
+        let mut each = vec![None; us.len()];
+        sampler.sample_each(&local, &us, &mut each);
+        for (&u, choice) in us.iter().zip(&each) {
+            assert_eq!(*choice, sampler.sample(&local, u), "sample_each and sample agree");
+        }
         if total > 0.0 {
             let expected: Vec<f64> = pmfs.iter().map(|p| p * f64::from(draws)).collect();
             let (statistic, dof) = pooled_chi_square(&observed, &expected, 5.0);

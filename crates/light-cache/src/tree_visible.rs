@@ -151,6 +151,10 @@ impl LightSampler for TreeVisibleSampler {
         self.schedule.wants_observations()
     }
 
+    fn frame_weight(&self) -> f32 {
+        self.schedule.frame_weight()
+    }
+
     fn set_eye(&mut self, _eye_ws: Vec3) {
         self.schedule.restart();
     }

@@ -80,12 +80,12 @@ impl DirectLight for Recorder {
         _scene: &Scene,
         (): &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: LightNumbers,
+        numbers: &[LightNumbers],
         _log: &mut TileLog<'_>,
         _probe: &mut impl Probe,
     ) -> Direct {
         let mut choices = self.choices.lock().unwrap_or_else(PoisonError::into_inner);
-        choices.push((vertex.point, numbers.choice));
+        choices.push((vertex.point, numbers[0].choice));
         Direct {
             radiance: Vec3::ZERO,
             light: None,

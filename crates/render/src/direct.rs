@@ -1,6 +1,7 @@
 //! Direct light at a path vertex by drawing one light (next-event estimation).
 
 use crate::path::{Probe, TileLog};
+use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
 use sampling::{VertexSequence, mis, unit_f32};
@@ -21,7 +22,7 @@ pub(crate) struct Vertex<'v> {
 }
 
 /// The random numbers of direct light at a vertex, 32 bits each.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct LightNumbers {
     /// Chooses the light.
     pub(crate) choice: u32,
@@ -44,7 +45,7 @@ impl LightNumbers {
 pub(crate) struct Direct {
     /// Throughput included.
     pub(crate) radiance: Vec3,
-    /// The light that was chosen, if one was.
+    /// The light that was chosen, the first of several, if one was.
     pub(crate) light: Option<u32>,
 }
 
@@ -58,19 +59,24 @@ pub(crate) trait DirectLight: Sync + Send {
     /// Prepares for `point`.
     fn local(&self, scene: &Scene, point: &ShadingPoint) -> Self::Local<'_>;
 
-    /// The direct light at `vertex`.
+    /// The direct light at `vertex`: the mean of as many samples as there are `numbers`.
     fn estimate(
         &self,
         scene: &Scene,
         local: &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: LightNumbers,
+        numbers: &[LightNumbers],
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct;
 
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
+
+    /// Weight of the next frame's samples, see [`LightSampler::frame_weight`].
+    fn frame_weight(&self) -> f32 {
+        1.0
+    }
 
     /// Tells where the eye is.
     fn set_eye(&mut self, eye_ws: Vec3);
@@ -118,43 +124,58 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         scene: &Scene,
         local: &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: LightNumbers,
+        numbers: &[LightNumbers],
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
-        let Some(choice) = self.0.sample(local, numbers.choice) else {
-            return Direct {
-                radiance: Vec3::ZERO,
-                light: None,
-            };
-        };
-        let on_light = Vec2::from(numbers.point.map(unit_f32));
-        let connection = Connection::new(scene, vertex, choice.light, choice.pmf, on_light);
-        let visible = connection
-            .as_ref()
-            .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
-        if S::LEARNS && self.0.wants_observations() {
-            log.observations.push(Observation {
-                point: vertex.point,
-                light: choice.light,
-                unshadowed: connection.as_ref().map_or(0.0, Connection::unshadowed),
-                irradiance: connection.as_ref().map_or(0.0, |c| c.irradiance),
-                pmf: choice.pmf,
-                visible,
-            });
+        let mut choices = [None; MAX_LIGHT_SAMPLES as usize];
+        let choices = &mut choices[..numbers.len()];
+        match numbers {
+            [one] => choices[0] = self.0.sample(local, one.choice),
+            _ => {
+                let mut us = [0; MAX_LIGHT_SAMPLES as usize];
+                us.iter_mut().zip(numbers).for_each(|(u, n)| *u = n.choice);
+                self.0.sample_each(local, &us[..numbers.len()], choices);
+            }
+        }
+        let count = numbers.len() as f32;
+        let mut radiance = Vec3::ZERO;
+        for (choice, numbers) in choices.iter().zip(numbers) {
+            let Some(choice) = choice else { continue };
+            let on_light = Vec2::from(numbers.point.map(unit_f32));
+            let connection = Connection::new(scene, vertex, choice.light, count * choice.pmf, on_light);
+            let visible = connection
+                .as_ref()
+                .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
+            if S::LEARNS && self.0.wants_observations() {
+                log.observations.push(Observation {
+                    point: vertex.point,
+                    light: choice.light,
+                    unshadowed: connection.as_ref().map_or(0.0, Connection::unshadowed),
+                    irradiance: connection.as_ref().map_or(0.0, |c| c.irradiance),
+                    pmf: choice.pmf,
+                    visible,
+                });
+            }
+            if let Some(connection) = connection
+                && visible
+            {
+                radiance += connection.contribution(count * choice.pmf);
+            }
         }
         Direct {
-            radiance: match connection {
-                Some(connection) if visible => connection.contribution(choice.pmf),
-                _ => Vec3::ZERO,
-            },
-            light: Some(choice.light),
+            radiance,
+            light: choices[0].map(|choice| choice.light),
         }
     }
 
     #[inline]
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32 {
         self.0.pmf(local, light)
+    }
+
+    fn frame_weight(&self) -> f32 {
+        self.0.frame_weight()
     }
 
     fn set_eye(&mut self, eye_ws: Vec3) {
@@ -202,7 +223,7 @@ pub(crate) struct Connection {
 }
 
 impl Connection {
-    /// Joins `vertex` with the point `u` on `light`, chosen with probability `pmf`; `None` if no light can arrive.
+    /// Joins `vertex` with the point `u` on `light`, chosen `pmf` times in the mean; `None` if no light can arrive.
     #[inline(always)]
     pub(crate) fn new(scene: &Scene, vertex: &Vertex<'_>, light: u32, pmf: f32, u: Vec2) -> Option<Self> {
         let surface = vertex.surface;
@@ -237,7 +258,7 @@ impl Connection {
         })
     }
 
-    /// What the light adds if it is visible, having been chosen with probability `pmf`.
+    /// What the light adds if it is visible, having been chosen `pmf` times in the mean.
     #[inline]
     pub(crate) fn contribution(&self, pmf: f32) -> Vec3 {
         self.unweighted * (self.weight / pmf)

@@ -129,13 +129,13 @@ impl DirectLight for AllLights {
         scene: &Scene,
         (): &Self::Local<'_>,
         vertex: &Vertex<'_>,
-        numbers: LightNumbers,
+        numbers: &[LightNumbers],
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
         // Each light gets the vertex's stratified point under a digital shift of its own (Kollig and Keller 2002,
         // section 3): as well stratified over the frames, and independent of the other lights.
-        let [u0, u1] = numbers.point;
+        let [u0, u1] = numbers[0].point;
         // In f64: a million lights may add up here.
         let mut sum = DVec3::ZERO;
         for light in self.reaching(vertex) {

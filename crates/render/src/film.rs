@@ -68,10 +68,12 @@ impl AovSample {
 /// Sums of one pixel.
 #[derive(Clone, Copy, Debug, Default)]
 struct PixelRecord {
-    /// R, G, B, luminance squared.
+    /// R, G, B, luminance squared, each times the weight of its frame.
     sums: PairSum<Vec4>,
     /// Samples in the sums: frames less those whose sample was not finite.
     count: u32,
+    /// Sum of their weights.
+    weight: f64,
 }
 
 /// Auxiliary sums of one pixel: albedo, normal, position, depth.
@@ -103,6 +105,8 @@ pub(crate) struct Tile {
     pub(crate) width: u32,
     /// Rows, at most [`TILE_SIZE`].
     pub(crate) height: u32,
+    /// Weight of the samples that are being added.
+    weight: f32,
     pixels: Box<[PixelRecord]>,
     /// Empty unless auxiliary images are kept.
     aovs: Box<[AovRecord]>,
@@ -120,8 +124,9 @@ impl Tile {
         let y = luminance(radiance);
         let y_sq = (y * y).min(LARGEST);
         let pixel = &mut self.pixels[index];
-        pixel.sums.add(radiance.extend(y_sq));
+        pixel.sums.add(radiance.extend(y_sq) * self.weight);
         pixel.count += 1;
+        pixel.weight += f64::from(self.weight);
         true
     }
 
@@ -147,6 +152,8 @@ pub struct Film {
     width: u32,
     height: u32,
     frames: u64,
+    /// Sum of the frames' weights, and of their squares.
+    weights: [f64; 2],
     has_aovs: bool,
     tiles: Vec<Tile>,
 }
@@ -165,6 +172,7 @@ impl Film {
                     y0,
                     width: w,
                     height: h,
+                    weight: 1.0,
                     pixels: vec![PixelRecord::default(); len].into(),
                     aovs: vec![AovRecord::EMPTY; if aovs { len } else { 0 }].into(),
                 }
@@ -174,6 +182,7 @@ impl Film {
             width,
             height,
             frames: 0,
+            weights: [0.0; 2],
             has_aovs: aovs,
             tiles,
         }
@@ -199,34 +208,44 @@ impl Film {
         self.tiles.len()
     }
 
-    /// Counts `frames` more samples in every pixel.
-    pub(crate) fn advance(&mut self, frames: u64) {
-        self.frames += frames;
+    /// From now on samples are added with this weight, above 0 and at most 1. Weights must not depend on the samples that
+    /// they weigh, or the mean is biased.
+    pub(crate) fn set_weight(&mut self, weight: f32) {
+        self.tiles.iter_mut().for_each(|tile| tile.weight = weight);
+    }
+
+    /// Counts one more sample in every pixel.
+    pub(crate) fn advance(&mut self) {
+        let weight = f64::from(self.tiles[0].weight);
+        self.weights = [self.weights[0] + weight, self.weights[1] + weight * weight];
+        self.frames += 1;
     }
 
     /// The mean image so far; black before the first frame.
     pub fn image(&self) -> Image {
         self.to_image(|tile, i| {
             let pixel = &tile.pixels[i];
-            let scale = 1.0 / f64::from(pixel.count.max(1));
+            let scale = if pixel.count > 0 { 1.0 / pixel.weight } else { 0.0 };
             let [r, g, b, _] = pixel.sums.values();
             [r, g, b].map(|sum| (sum * scale) as f32)
         })
     }
 
-    /// Per pixel the variance of the mean's luminance (sample variance / number of samples), row 0 first; 0 before the
-    /// second frame. Never negative.
+    /// Per pixel the variance of the mean's luminance, row 0 first; 0 before the second frame. Never negative. Where frames
+    /// have weights: that of samples that vary alike, (sum of the squared weights) / (sum of the weights)^2 x their variance; a
+    /// little more than the truth if it is those of little weight that vary more.
     pub fn variance(&self) -> Vec<f32> {
+        // 1 / n for n frames that weigh the same.
+        let share = self.weights[1] / (self.weights[0] * self.weights[0]);
         self.to_rows(0.0, |tile, i| {
             let pixel = &tile.pixels[i];
             if pixel.count < 2 {
                 return 0.0;
             }
-            let n = f64::from(pixel.count);
-            let [r, g, b, y_sq] = pixel.sums.values().map(|sum| sum / n);
+            let [r, g, b, y_sq] = pixel.sums.values().map(|sum| sum / pixel.weight);
             let mean = 0.2126 * r + 0.7152 * g + 0.0722 * b;
             // Rounding may take the difference of two nearly equal squares below zero.
-            ((y_sq - mean * mean) / (n - 1.0)).max(0.0) as f32
+            ((y_sq - mean * mean) * share / (1.0 - share)).max(0.0) as f32
         })
     }
 
@@ -304,7 +323,7 @@ mod tests {
                     tile.add(i as usize, sample(frame, x, y));
                 }
             }
-            film.advance(1);
+            film.advance();
         }
         film
     }
@@ -345,6 +364,22 @@ mod tests {
             assert!((0.0..1e-9).contains(&v), "{v}");
         }
         assert_eq!(filled(2, 2, 1, |_, _, _| Vec3::ONE).variance(), vec![0.0; 4]);
+    }
+
+    #[test]
+    fn weighted_frames_make_a_weighted_mean_and_its_variance() {
+        let mut film = Film::new(1, 1, false);
+        for (weight, value) in [(0.25, 8.0), (1.0, 1.0), (1.0, 3.0)] {
+            film.set_weight(weight);
+            film.tiles_mut()[0].add(0, Vec3::splat(value));
+            film.advance();
+        }
+        let mean = 6.0 / 2.25;
+        assert!((film.image().pixels[0][0] - mean).abs() < 1e-6);
+        let spread = (0.25 * 64.0 + 1.0 + 9.0) / 2.25 - mean * mean;
+        let share = (0.0625 + 2.0) / (2.25 * 2.25);
+        assert!((film.variance()[0] - spread * share / (1.0 - share)).abs() < 1e-5);
+        assert_eq!(film.spp(), 3);
     }
 
     #[test]

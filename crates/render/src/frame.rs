@@ -148,6 +148,7 @@ pub(crate) struct Eye<'s> {
     /// Number of the next frame since the start of the rendering, whatever has changed since. The sequence has 2^32
     /// points; a rendering of more repeats it.
     pub(crate) frame: u32,
+    pub(crate) light_samples: u32,
     pub(crate) area_lights: bool,
 }
 
@@ -162,6 +163,7 @@ impl Eye<'_> {
             max_bounces: self.max_bounces,
             seed: self.seed,
             frame: self.frame,
+            light_samples: self.light_samples,
             area_lights: self.area_lights,
         }
     }
@@ -220,6 +222,7 @@ impl<D: DirectLight> Frames for Drawn<D> {
     /// nothing and their number changes nothing.
     fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
         let view = eye.view(&self.direct);
+        film.set_weight(self.direct.frame_weight());
         let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
         let counters = tiles.map(|(tile, observations)| {
             observations.clear();
@@ -285,6 +288,10 @@ impl<'s, F: Frames> Rendering<'s, F> {
                 max_bounces: settings.max_bounces,
                 seed: settings.seed,
                 frame: 0,
+                light_samples: match settings.method {
+                    Method::Exact => 1,
+                    _ => settings.light_samples,
+                },
                 area_lights: scene.lights.iter().any(|light| !light.is_delta()),
             },
             aovs: settings.aovs,
@@ -309,7 +316,7 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
             self.frames.render::<false>(&self.eye, &mut self.film)
         };
         self.counters = self.counters + counters;
-        self.film.advance(1);
+        self.film.advance();
         self.eye.frame = self.eye.frame.wrapping_add(1);
         self.render_s += start.elapsed().as_secs_f64();
     }

@@ -187,11 +187,11 @@ impl DirectLight for Survey<'_> {
         scene: &Scene,
         (): &(),
         vertex: &Vertex<'_>,
-        numbers: LightNumbers,
+        numbers: &[LightNumbers],
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
-        let [u0, u1] = numbers.point;
+        let [u0, u1] = numbers[0].point;
         let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
         for light in self.lights.reaching(vertex) {
             let u = Vec2::new(unit_f32(u0 ^ hash2(light, 0)), unit_f32(u1 ^ hash2(light, 1)));

@@ -3,6 +3,7 @@
 use crate::direct::{DirectLight, LightNumbers, Vertex};
 use crate::film::{AovSample, Tile};
 use crate::filter::FilterSampler;
+use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
 use sampling::{PixelSequence, first_vertices, mis, unit_f32};
@@ -31,8 +32,20 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) seed: u64,
     /// Number of the frame = sample number of every pixel.
     pub(crate) frame: u32,
+    /// Lights drawn at the first surface.
+    pub(crate) light_samples: u32,
     /// Whether any light can be hit, so that drawing from the BSDF can find it.
     pub(crate) area_lights: bool,
+}
+
+impl<D> FrameView<'_, D> {
+    /// The points of the sequence that the light samples of this frame take: together they are the first points of it,
+    /// stratified in every power of two, frame by frame and all frames together.
+    #[inline(always)]
+    fn light_sample_indices(&self) -> impl Iterator<Item = u32> + use<D> {
+        let first = self.frame.wrapping_mul(self.light_samples);
+        (0..self.light_samples).map(move |k| first.wrapping_add(k))
+    }
 }
 
 /// What is counted.
@@ -145,8 +158,8 @@ pub(crate) struct Starts {
     first_pixel: u32,
     rays: Packet,
     hits: [Option<Hit>; PACKET],
-    /// By dimension: for the position in the pixel, the choice of a light, the point on it.
-    numbers: [[u32; PACKET]; 5],
+    /// For each light sample by dimension: for the choice of a light, the point on it.
+    light_numbers: [[[u32; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize],
 }
 
 /// Where a path begins.
@@ -154,22 +167,30 @@ pub(crate) struct Start {
     pixel: u32,
     direction_ws: Vec3,
     hit: Option<Hit>,
-    light_numbers: LightNumbers,
+    /// As many as there are light samples.
+    light_numbers: [LightNumbers; MAX_LIGHT_SAMPLES as usize],
 }
 
 impl Starts {
     /// In the pixels of row `y` from column `x` on. Those beyond the image's edge are of no use, and harmless.
-    #[allow(clippy::needless_range_loop, reason = "pixels are the inner index of what the outer loop fills")]
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "pixels are the inner index of what the outer loop fills"
+    )]
     #[inline(always)]
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let first_pixel = y * view.image_width + x;
-        let numbers: [[u32; PACKET]; 5] = first_vertices(view.seed, first_pixel, view.frame);
+        let in_pixel: [[u32; PACKET]; 2] = first_vertices(view.seed, first_pixel, view.frame, 0);
+        let mut light_numbers = [[[0; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize];
+        for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
+            *numbers = first_vertices(view.seed, first_pixel, index, 2);
+        }
         let mut rays = Packet {
             origin_ws: view.camera.origin_ws,
             directions_ws: [[0.0; PACKET]; 3],
         };
         for i in 0..PACKET {
-            let direction_ws = eye_direction_ws(view, x + i as u32, y, [numbers[0][i], numbers[1][i]]).to_array();
+            let direction_ws = eye_direction_ws(view, x + i as u32, y, [in_pixel[0][i], in_pixel[1][i]]).to_array();
             for axis in 0..3 {
                 rays.directions_ws[axis][i] = direction_ws[axis];
             }
@@ -178,21 +199,20 @@ impl Starts {
             first_pixel,
             hits: view.scene.nearest_of_packet(&rays),
             rays,
-            numbers,
+            light_numbers,
         }
     }
 
     #[inline(always)]
     pub(crate) fn get(&self, i: usize) -> Start {
-        let [_, _, choice, point @ ..] = &self.numbers;
         Start {
             pixel: self.first_pixel + i as u32,
             direction_ws: self.rays.direction_ws(i),
             hit: self.hits[i],
-            light_numbers: LightNumbers {
+            light_numbers: self.light_numbers.map(|[choice, u, v]| LightNumbers {
                 choice: choice[i],
-                point: [point[0][i], point[1][i]],
-            },
+                point: [u[i], v[i]],
+            }),
         }
     }
 }
@@ -201,7 +221,12 @@ impl Start {
     /// In one pixel, without its neighbours.
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let pixel = y * view.image_width + x;
-        let [[u], [v], [choice], [on_light_0], [on_light_1]] = first_vertices(view.seed, pixel, view.frame);
+        let [[u], [v]] = first_vertices(view.seed, pixel, view.frame, 0);
+        let mut light_numbers = [LightNumbers::default(); MAX_LIGHT_SAMPLES as usize];
+        for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
+            let [[choice], [u], [v]] = first_vertices(view.seed, pixel, index, 2);
+            *numbers = LightNumbers { choice, point: [u, v] };
+        }
         let direction_ws = eye_direction_ws(view, x, y, [u, v]);
         let ray = Ray {
             origin_ws: view.camera.origin_ws,
@@ -212,10 +237,7 @@ impl Start {
             pixel,
             direction_ws,
             hit: view.scene.nearest(&ray, PrimitiveId::NONE),
-            light_numbers: LightNumbers {
-                choice,
-                point: [on_light_0, on_light_1],
-            },
+            light_numbers,
         }
     }
 }
@@ -246,7 +268,8 @@ pub(crate) fn path<D: DirectLight>(
     log.counters.rays_nearest += 1;
     probe.nearest(&ray, PrimitiveId::NONE);
     let mut found = start.hit;
-    let mut light_numbers = start.light_numbers;
+    let mut later_numbers;
+    let mut light_numbers = &start.light_numbers[..view.light_samples as usize];
     let mut left: Option<Departure<D::Local<'_>>> = None;
     let mut radiance = Vec3::ZERO;
     let mut throughput = Vec3::ONE;
@@ -316,10 +339,12 @@ pub(crate) fn path<D: DirectLight>(
         left = Some(Departure {
             local,
             position_ws: surface.position_ws,
+            light_samples: light_numbers.len() as f32,
             pdf_solid_angle: sample.pdf_solid_angle,
         });
         bounce += 1;
-        light_numbers = LightNumbers::new(&sequence.vertex(bounce));
+        later_numbers = [LightNumbers::new(&sequence.vertex(bounce))];
+        light_numbers = &later_numbers;
 
         // The nearest surface.
         log.counters.rays_nearest += 1;
@@ -333,6 +358,8 @@ pub(crate) fn path<D: DirectLight>(
 struct Departure<L> {
     local: L,
     position_ws: Vec3,
+    /// How many lights were drawn there.
+    light_samples: f32,
     /// Density with which the BSDF drew the direction.
     pdf_solid_angle: f32,
 }
@@ -344,7 +371,8 @@ impl<L> Departure<L> {
         D: DirectLight<Local<'f> = L>,
     {
         let pdf_light = view.scene.lights[light as usize].pdf_solid_angle(self.position_ws, wi_ws, distance);
-        mis::power(self.pdf_solid_angle, view.direct.pmf(&self.local, light) * pdf_light)
+        let pmf = view.direct.pmf(&self.local, light);
+        mis::power(self.pdf_solid_angle, self.light_samples * pmf * pdf_light)
     }
 }
 

@@ -91,6 +91,10 @@ pub struct Settings {
     /// Number of bounces after the first surface: 0 = emission and direct light only. Higher values add indirect
     /// light; lower values are faster.
     pub max_bounces: u32,
+    /// Lights drawn at the first surface of every path, 1..=[`MAX_LIGHT_SAMPLES`]. Higher values spend more on light where
+    /// eye rays are dear; lower values make more frames. `exact` draws none.
+    #[serde(default = "default_light_samples")]
+    pub light_samples: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads.
     pub seed: u64,
     /// `oracle`: times that it looks at all lights from every pixel, 1..=65,536. Higher values come closer to the best
@@ -116,6 +120,7 @@ impl Default for Settings {
             height: 720,
             method: Method::Sampled(SamplerKind::Adaptive),
             max_bounces: 0,
+            light_samples: default_light_samples(),
             seed: 0,
             oracle_passes: default_oracle_passes(),
             pixel_filter: PixelFilter::Box,
@@ -124,6 +129,13 @@ impl Default for Settings {
             record_lights: false,
         }
     }
+}
+
+/// Most lights drawn at one surface.
+pub const MAX_LIGHT_SAMPLES: u32 = 8;
+
+fn default_light_samples() -> u32 {
+    1
 }
 
 fn default_oracle_passes() -> u32 {
@@ -154,6 +166,9 @@ impl Settings {
                 format!("oracle with max_bounces = {}", self.max_bounces),
                 "it knows what is best for direct light at the first hit only: max_bounces must be 0",
             );
+        }
+        if !(1..=MAX_LIGHT_SAMPLES).contains(&self.light_samples) {
+            return refuse(format!("light_samples = {}", self.light_samples), "must be 1 to 8");
         }
         if !(1..=65_536).contains(&self.oracle_passes) {
             return refuse(

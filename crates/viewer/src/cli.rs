@@ -61,6 +61,12 @@ pub(crate) struct LightArgs {
     /// Higher values add indirect light; lower values are faster.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=1000))]
     pub(crate) max_bounces: u32,
+    /// Lights drawn at the first surface of every path, 1 to 8
+    ///
+    /// Higher values spend more on light where eye rays are dear; lower values make more frames.
+    #[arg(long, value_name = "N", default_value_t = render::Settings::default().light_samples,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(render::MAX_LIGHT_SAMPLES)))]
+    pub(crate) light_samples: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
@@ -143,6 +149,7 @@ impl LightArgs {
             height,
             method,
             max_bounces: self.max_bounces,
+            light_samples: self.light_samples,
             seed: self.seed,
             oracle_passes: self.oracle_passes,
             pixel_filter: self.pixel_filter.into(),

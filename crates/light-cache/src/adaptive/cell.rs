@@ -234,6 +234,12 @@ impl Cell {
         self.weights.find(receiver, Wanted::At(x), width)
     }
 
+    /// The same for several positions.
+    #[inline]
+    pub(super) fn draw_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+        self.weights.find_each(receiver, wanted, width, parts);
+    }
+
     /// The entry that holds the light at `position` in tree order, and its part of the interval.
     #[inline]
     pub(super) fn part_of(&self, receiver: &Receiver, position: u32, width: u64) -> Option<Part> {

@@ -29,12 +29,16 @@ use cells::Cells;
 use glam::Vec3;
 use scene::Scene;
 use std::time::Instant;
+use weights::{Part, Wanted};
 
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
 const TABLE_SHARE: f64 = 0.03;
 
 /// Entries of a cell are drawn with 52 bits, which `f64` holds exactly; what is below goes to the lights within an entry.
 const CELL_SHIFT: u32 = 11;
+
+/// Lights that are drawn from one evaluation of a cell.
+const EACH: usize = 8;
 
 /// Learned cuts.
 #[derive(Debug)]
@@ -115,6 +119,10 @@ impl LightSampler for AdaptiveSampler {
         self.schedule.wants_observations()
     }
 
+    fn frame_weight(&self) -> f32 {
+        self.schedule.frame_weight()
+    }
+
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.cells.set_eye(eye_ws);
         self.schedule.restart();
@@ -156,13 +164,8 @@ impl LightSampler for AdaptiveSampler {
             Source::Tree(descent) => descent.draw(x - table_width, UNIT - table_width),
             Source::Cell(cell) => {
                 let x = x - table_width;
-                let whole = (UNIT - table_width) >> CELL_SHIFT;
-                let part = cell.draw(&local.receiver, x >> CELL_SHIFT, whole)?;
-                let (start, own) = (part.start << CELL_SHIFT, part.width << CELL_SHIFT);
-                match part.branch.light() {
-                    Some(place) => (place, own),
-                    None => self.inside(local).draw_in(part.branch.node(), x - start, own),
-                }
+                let part = cell.draw(&local.receiver, x >> CELL_SHIFT, self.cell_width())?;
+                self.within(local, &part, x)
             }
         };
         let light = self.tree().light_at(place);
@@ -172,6 +175,40 @@ impl LightSampler for AdaptiveSampler {
         })
     }
 
+    fn sample_each(&self, local: &Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
+        let table_width = width(self.first_mass.into());
+        let Source::Cell(cell) = &local.source else {
+            let each = choices.iter_mut().zip(us);
+            return each.for_each(|(choice, &u)| *choice = self.sample(local, u));
+        };
+        for (us, choices) in us.chunks(EACH).zip(choices.chunks_mut(EACH)) {
+            let mut wanted = [Wanted::At(0); EACH];
+            let mut parts = [None; EACH];
+            for (wanted, &u) in wanted.iter_mut().zip(us) {
+                *wanted = Wanted::At(position(u, local.salt).saturating_sub(table_width) >> CELL_SHIFT);
+            }
+            cell.draw_each(
+                &local.receiver,
+                &wanted[..us.len()],
+                self.cell_width(),
+                &mut parts[..us.len()],
+            );
+            for ((choice, &u), part) in choices.iter_mut().zip(us).zip(&parts) {
+                let x = position(u, local.salt);
+                *choice = if x < table_width {
+                    self.sample(local, u)
+                } else {
+                    part.map(|part| {
+                        let (place, own) = self.within(local, &part, x - table_width);
+                        let light = self.tree().light_at(place);
+                        let pmf = probability(own) + self.table_pmf(local, light);
+                        Choice { light, pmf }
+                    })
+                };
+            }
+        }
+    }
+
     #[inline]
     fn pmf(&self, local: &Local<'_>, light: u32) -> f32 {
         let place = self.tree().rank[light as usize];
@@ -179,9 +216,8 @@ impl LightSampler for AdaptiveSampler {
             Source::Nothing => return 0.0,
             Source::Tree(descent) => descent.width_of(place, UNIT - width(self.first_mass.into())),
             Source::Cell(cell) => {
-                let whole = (UNIT - width(self.first_mass.into())) >> CELL_SHIFT;
                 // Where nothing can arrive nothing is drawn, not by the table either.
-                let Some(part) = cell.part_of(&local.receiver, place, whole) else {
+                let Some(part) = cell.part_of(&local.receiver, place, self.cell_width()) else {
                     return 0.0;
                 };
                 let own = part.width << CELL_SHIFT;
@@ -226,6 +262,22 @@ impl LightSampler for AdaptiveSampler {
 }
 
 impl AdaptiveSampler {
+    /// The width that is cut among the entries of a cell.
+    #[inline]
+    fn cell_width(&self) -> u64 {
+        (UNIT - width(self.first_mass.into())) >> CELL_SHIFT
+    }
+
+    /// The light at position `x` (within what the table leaves), given the entry there; returns its place in tree order and its own width.
+    #[inline]
+    fn within(&self, local: &Local<'_>, part: &Part, x: u64) -> (u32, u64) {
+        let (start, own) = (part.start << CELL_SHIFT, part.width << CELL_SHIFT);
+        match part.branch.light() {
+            Some(place) => (place, own),
+            None => self.inside(local).draw_in(part.branch.node(), x - start, own),
+        }
+    }
+
     /// For the inside of a cluster.
     #[inline]
     fn inside(&self, local: &Local<'_>) -> Descent<'_> {

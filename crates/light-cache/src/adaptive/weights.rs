@@ -134,65 +134,83 @@ impl Weights {
 
     /// The part that holds `wanted`, of an interval of `width`, which is at most 2^52, cut in proportion to the weights at a
     /// point; `None` if all are zero.
+    #[inline]
+    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        let mut part = [None];
+        self.find_each(receiver, &[wanted], width, &mut part);
+        part[0]
+    }
+
+    /// The same for each of `wanted`; the weights are worked out once.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[allow(unsafe_code, reason = "compiled for instructions that not every processor has")]
-    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+    pub(super) fn find_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
         if is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512dq")
         {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx512(receiver, wanted, width) }
+            unsafe { self.find_avx512(receiver, wanted, width, parts) }
         } else if is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx2(receiver, wanted, width) }
+            unsafe { self.find_avx2(receiver, wanted, width, parts) }
         } else {
-            self.find_anywhere(receiver, wanted, width)
+            self.find_anywhere(receiver, wanted, width, parts);
         }
     }
 
     /// The same on other processors.
     #[cfg(not(target_arch = "x86_64"))]
     #[inline]
-    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
-        self.find_anywhere(receiver, wanted, width)
+    pub(super) fn find_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+        self.find_anywhere(receiver, wanted, width, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
-    fn find_avx512(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
-        self.find_anywhere(receiver, wanted, width)
+    fn find_avx512(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+        self.find_anywhere(receiver, wanted, width, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn find_avx2(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
-        self.find_anywhere(receiver, wanted, width)
+    fn find_avx2(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+        self.find_anywhere(receiver, wanted, width, parts);
     }
 
     #[inline(always)]
-    fn find_anywhere(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+    fn find_anywhere(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
         let (weights, lanes) = self.evaluate(receiver);
-        let cut = Cut::new(&lanes, width)?;
+        let Some(cut) = Cut::new(&lanes, width) else {
+            parts.fill(None);
+            return;
+        };
+        for (part, &wanted) in parts.iter_mut().zip(wanted) {
+            *part = Some(self.part(&weights, &cut, wanted));
+        }
+    }
+
+    #[inline(always)]
+    fn part(&self, weights: &[Lanes; MAX_ROWS], cut: &Cut, wanted: Wanted) -> Part {
         let lane = match wanted {
             Wanted::At(x) => cut.index_at(x),
             Wanted::Entry(entry) => entry / self.rows.len(),
         };
         let (lane_start, lane_width) = cut.part(lane);
         // A lane without weight is never drawn, but its entries may be asked for.
-        let cut = Cut::new(&column(&weights, lane), lane_width);
+        let cut = Cut::new(&column(weights, lane), lane_width);
         let row = match (wanted, &cut) {
             (Wanted::At(x), Some(cut)) => cut.index_at(x - lane_start),
             (Wanted::At(_), None) => 0,
             (Wanted::Entry(entry), _) => entry % self.rows.len(),
         };
         let (start, width) = cut.map_or((0, 0), |cut| cut.part(row));
-        Some(Part {
+        Part {
             branch: self.rows[row].branch[lane],
             start: lane_start + start,
             width,
-        })
+        }
     }
 
     /// All weights, and the sums of the lanes.
@@ -356,10 +374,9 @@ mod tests {
                 Wanted::At(u64::from(x) << 19),
                 Wanted::Entry(x as usize % entries.len()),
             ] {
-                assert_eq!(
-                    weights.find(&receiver, wanted, WIDTH),
-                    weights.find_anywhere(&receiver, wanted, WIDTH)
-                );
+                let mut portable = [None];
+                weights.find_anywhere(&receiver, &[wanted], WIDTH, &mut portable);
+                assert_eq!(weights.find(&receiver, wanted, WIDTH), portable[0]);
             }
             let mut end = 0;
             for entry in 0..entries.len() {
