@@ -308,6 +308,11 @@ impl LightSampler for TableSampler {
         self.schedule.wants_observations()
     }
 
+    /// What was learned may be wrong, and is learned again in a few frames.
+    fn scene_changed(&mut self, scene: &Scene) {
+        *self = Self::with_caution(&scene.lights, scene.radius, &self.settings, self.cautious);
+    }
+
     fn frame_weight(&self) -> f32 {
         self.schedule.frame_weight()
     }

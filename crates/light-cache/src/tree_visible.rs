@@ -30,6 +30,7 @@ pub struct TreeVisibleSampler {
     floor: Floor,
     /// Which frames are learned from.
     schedule: Schedule,
+    settings: Settings,
     /// Observations since the tree was last weighted.
     fresh: usize,
     observations: u64,
@@ -62,6 +63,7 @@ impl TreeVisibleSampler {
             visibility: Visibility::new(&tree, cautious),
             floor: Floor::new(settings.min_probability_mass, lights.len()),
             schedule: Schedule::default(),
+            settings: settings.clone(),
             fresh: 0,
             observations: 0,
             build_s: start.elapsed().as_secs_f64(),
@@ -149,6 +151,11 @@ impl LightSampler for TreeVisibleSampler {
 
     fn wants_observations(&self) -> bool {
         self.schedule.wants_observations()
+    }
+
+    /// What was learned may be wrong, and is learned again in a few frames.
+    fn scene_changed(&mut self, scene: &Scene) {
+        *self = Self::with_caution(&scene.lights, &self.settings, false);
     }
 
     fn frame_weight(&self) -> f32 {

@@ -46,6 +46,15 @@ impl Branch {
         }
     }
 
+    /// How many lights it holds.
+    pub(super) fn count(self, tree: &Tree) -> u32 {
+        match (self.light(), self.node()) {
+            (Some(_), _) => 1,
+            (_, Some(node)) => tree.nodes[node as usize].count,
+            _ => tree.distant.len() as u32,
+        }
+    }
+
     /// The parts it falls into, in tree order: none for a light and for the lights at infinity.
     pub(super) fn children(self, tree: &Tree) -> ([Self; MAX_LEAF_LIGHTS], usize) {
         let mut children = [Self::DISTANT; MAX_LEAF_LIGHTS];

@@ -94,15 +94,28 @@ impl Entry {
     }
 }
 
+/// Which cell a cell is, and since when.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Origin {
+    /// Its key in the grid.
+    pub(super) key: u64,
+    /// Its level in the grid.
+    pub(super) level: u32,
+    /// Whether it holds first hits.
+    pub(super) primary: bool,
+    /// Number of the frame that it was made after.
+    pub(super) frame: u64,
+}
+
 /// A cell of the grid.
 #[derive(Clone, Debug)]
 pub(super) struct Cell {
-    /// Its key in the grid.
-    pub(super) key: u64,
+    /// Which cell it is.
+    pub(super) origin: Origin,
     /// Whether it has been halved: it then serves only where a half is missing.
     pub(super) split: bool,
     /// Points of the cell, at most [`PROBES`].
-    probes: Vec<Receiver>,
+    pub(super) probes: Vec<Receiver>,
     /// The cut, in tree order: its entries' lights are all lights, each once.
     pub(super) entries: Vec<Entry>,
     /// First light of each entry, in tree order.
@@ -118,10 +131,10 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    fn empty(key: u64, points: &[Receiver]) -> Self {
+    fn empty(origin: Origin, points: &[Receiver]) -> Self {
         let step = points.len().div_ceil(PROBES).max(1);
         Self {
-            key,
+            origin,
             split: false,
             probes: points.iter().step_by(step).copied().collect(),
             entries: Vec::with_capacity(FIRST_ENTRIES + MAX_LEAF_LIGHTS),
@@ -135,8 +148,8 @@ impl Cell {
     }
 
     /// A half of `parent`: it starts with the parent's cut and with what is known from there.
-    pub(super) fn half(key: u64, parent: &Self, points: &[Receiver], tree: &Tree) -> Self {
-        let mut cell = Self::empty(key, points);
+    pub(super) fn half(origin: Origin, parent: &Self, points: &[Receiver], tree: &Tree) -> Self {
+        let mut cell = Self::empty(origin, points);
         for known in &parent.entries {
             let seen = known.visible > 0.0;
             let most = if seen { INHERITED_COUNT } else { INHERITED_UNSEEN };
@@ -157,8 +170,8 @@ impl Cell {
     }
 
     /// A new cell at its first observed points: a cut from the tree's own importance.
-    pub(super) fn new(key: u64, points: &[Receiver], tree: &Tree) -> Self {
-        let mut cell = Self::empty(key, points);
+    pub(super) fn new(origin: Origin, points: &[Receiver], tree: &Tree) -> Self {
+        let mut cell = Self::empty(origin, points);
         if !tree.leaves.is_empty() {
             cell.entries.push(cell.unseen(tree, Branch::ROOT));
         }

@@ -85,7 +85,7 @@ impl Grid {
             kind: dominant_axis(point.normal_ws) << 1 | u32::from(point.primary),
         };
         // From the finest up: after a while most points are in one of the finest.
-        let mut missing = None;
+        let mut missing: Option<Missing> = None;
         for level in top.saturating_sub(MAX_HALVINGS)..=top {
             let key = self.key(&spot, level);
             let value = self.find(key);
@@ -96,9 +96,16 @@ impl Grid {
                     missing: missing.filter(|_| halved),
                 };
             }
-            missing = Some(key);
+            missing = Some(Missing { key, level });
         }
         Place { cell: NO_CELL, missing }
+    }
+
+    /// Centre and edge, world space, of the cell of `level` that holds a position.
+    pub(super) fn bounds(&self, position_ws: Vec3, level: u32) -> (Vec3, f32) {
+        let size = self.min_size * (1u64 << level) as f32;
+        let corner = ((position_ws - self.center_ws) / size).floor();
+        (self.center_ws + (corner + 0.5) * size, size)
     }
 
     #[inline]
@@ -149,8 +156,17 @@ impl Grid {
 pub(super) struct Place {
     /// The finest cell that exists, or [`NO_CELL`].
     pub(super) cell: u32,
-    /// Key of the cell that ought to be made here, if one is missing.
-    pub(super) missing: Option<u64>,
+    /// The cell that ought to be made here, if one is missing.
+    pub(super) missing: Option<Missing>,
+}
+
+/// A cell that does not exist yet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Missing {
+    /// Its key.
+    pub(super) key: u64,
+    /// Its level.
+    pub(super) level: u32,
 }
 
 /// What the keys of all levels at a point have in common.
@@ -170,7 +186,7 @@ fn floor(x: f32) -> i32 {
 
 /// 0..6: the axis, and the side of it, to which the normal is nearest.
 #[inline]
-fn dominant_axis(normal: Vec3) -> u32 {
+pub(super) fn dominant_axis(normal: Vec3) -> u32 {
     let a = normal.abs();
     let axis = if a.x >= a.y && a.x >= a.z {
         0

@@ -21,7 +21,7 @@ mod weights;
 use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
-    Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
+    CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
     TreeVisibleSampler, records,
 };
 use cell::Cell;
@@ -51,6 +51,9 @@ pub struct AdaptiveSampler {
     first_mass: u32,
     /// Which frames are learned from.
     schedule: Schedule,
+    /// Frames done.
+    frames: u64,
+    settings: Settings,
     build_s: f64,
     learn_s: f64,
 }
@@ -104,6 +107,8 @@ impl AdaptiveSampler {
             cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
             first_mass,
             schedule: Schedule::default(),
+            frames: 0,
+            settings: settings.clone(),
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
         }
@@ -121,6 +126,11 @@ impl LightSampler for AdaptiveSampler {
 
     fn frame_weight(&self) -> f32 {
         self.schedule.frame_weight()
+    }
+
+    /// What was learned may be wrong anywhere, and is learned again in a few frames.
+    fn scene_changed(&mut self, scene: &Scene) {
+        *self = Self::new(scene, &self.settings);
     }
 
     fn set_eye(&mut self, eye_ws: Vec3) {
@@ -232,6 +242,8 @@ impl LightSampler for AdaptiveSampler {
 
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
         let start = Instant::now();
+        self.frames += 1;
+        let frame = self.frames;
         let Some(logs) = self.schedule.end_frame(logs) else {
             return;
         };
@@ -239,7 +251,7 @@ impl LightSampler for AdaptiveSampler {
         // First: what new cells believe of visibility is what the whole image has taught so far.
         self.prior.learn(logs);
         let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
-        rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), logs));
+        rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), frame, logs));
         self.learn_s += start.elapsed().as_secs_f64();
     }
 
@@ -258,6 +270,10 @@ impl LightSampler for AdaptiveSampler {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         records::of_sampler(self, scene, &[])
+    }
+
+    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
+        self.cells.records(self.tree(), self.frames)
     }
 }
 
