@@ -4,7 +4,7 @@
 //! validates it, finds the lights and builds the acceleration structure; after that a scene never changes.
 //!
 //! Absent from this crate: GPU, random state (samples take their `u` as an argument), windows. Files are read in
-//! [`gltf`] and made in [`export`] only, by way of [`file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
+//! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
 pub mod bsdf;
