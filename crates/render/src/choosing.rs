@@ -5,7 +5,7 @@ use crate::direct::{Direct, DirectLight, LightNumbers, Vertex};
 use crate::frame::Eye;
 use crate::path::{Counters, Probe, Start, TileLog, path};
 use glam::Vec3;
-use light_cache::{LightRecord, Observation, SamplerStats, ShadingPoint};
+use light_cache::ShadingPoint;
 use scene::Scene;
 use std::hint::black_box;
 use std::sync::{Mutex, PoisonError};
@@ -94,17 +94,5 @@ impl DirectLight for Recorder {
 
     fn pmf(&self, (): &Self::Local<'_>, _light: u32) -> f32 {
         1.0
-    }
-
-    fn set_eye(&mut self, _eye_ws: Vec3) {}
-
-    fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
-
-    fn sampler_stats(&self) -> Option<SamplerStats> {
-        None
-    }
-
-    fn records(&self, _scene: &Scene) -> Vec<LightRecord> {
-        Vec::new()
     }
 }

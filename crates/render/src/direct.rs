@@ -79,19 +79,23 @@ pub(crate) trait DirectLight: Sync + Send {
     }
 
     /// Tells where the eye is.
-    fn set_eye(&mut self, eye_ws: Vec3);
+    fn set_eye(&mut self, _eye_ws: Vec3) {}
 
     /// Tells that the scene has changed: see [`LightSampler::scene_changed`].
     fn scene_changed(&mut self, _scene: &Scene) {}
 
     /// Learns from a frame.
-    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
+    fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
 
     /// What a sampler can tell about itself; `None` if there is none.
-    fn sampler_stats(&self) -> Option<SamplerStats>;
+    fn sampler_stats(&self) -> Option<SamplerStats> {
+        None
+    }
 
     /// What is known about each light.
-    fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+    fn records(&self, _scene: &Scene) -> Vec<LightRecord> {
+        Vec::new()
+    }
 
     /// What is known in each cell.
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {

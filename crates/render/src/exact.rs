@@ -3,7 +3,7 @@
 use crate::direct::{Connection, Direct, DirectLight, LightNumbers, Vertex};
 use crate::path::{Probe, TileLog};
 use glam::{DVec3, Vec2, Vec3};
-use light_cache::{LightRecord, Observation, SamplerStats, ShadingPoint};
+use light_cache::ShadingPoint;
 use sampling::hash::hash2;
 use sampling::unit_f32;
 use scene::{Light, LightKind, Scene};
@@ -156,19 +156,7 @@ impl DirectLight for AllLights {
         1.0
     }
 
-    fn set_eye(&mut self, _eye_ws: Vec3) {}
-
     fn scene_changed(&mut self, scene: &Scene) {
         *self = Self::new(&scene.lights);
-    }
-
-    fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
-
-    fn sampler_stats(&self) -> Option<SamplerStats> {
-        None
-    }
-
-    fn records(&self, _scene: &Scene) -> Vec<LightRecord> {
-        Vec::new()
     }
 }

@@ -210,18 +210,6 @@ impl DirectLight for Survey<'_> {
     fn pmf(&self, (): &(), _light: u32) -> f32 {
         1.0
     }
-
-    fn set_eye(&mut self, _eye_ws: Vec3) {}
-
-    fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
-
-    fn sampler_stats(&self) -> Option<SamplerStats> {
-        None
-    }
-
-    fn records(&self, _scene: &Scene) -> Vec<LightRecord> {
-        Vec::new()
-    }
 }
 
 /// What is known about one pixel: the lights that were seen there, in their order, and the rest, which stands for all
