@@ -7,7 +7,8 @@
 
 use super::branch::Branch;
 use super::emitter::Emitter;
-use super::weights::{Part, Wanted, Weights};
+use super::subcells::{Count, Cube, SubCells};
+use super::weights::{Lanes, Part, Wanted, Weights};
 use crate::Observation;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 
@@ -29,12 +30,6 @@ const MERGE_SHARE: f32 = 0.05 / MAX_ENTRIES as f32;
 const SPIKE: f32 = 16.0;
 /// Points that stand for the cell where an entry's weight is wanted without a point.
 const PROBES: usize = 8;
-/// Observations after which a cell is halved.
-const HALVE_AT: f32 = 400.0;
-/// How many observations of an entry a half takes over from the whole, at most.
-const INHERITED_COUNT: f32 = 4.0;
-/// The same for entries that were never visible.
-const INHERITED_UNSEEN: f32 = 32.0;
 /// Weights are made anew when the cell has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
 
@@ -97,8 +92,6 @@ impl Entry {
 /// Which cell a cell is, and since when.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
-    /// Its key in the grid.
-    pub(super) key: u64,
     /// Its level in the grid.
     pub(super) level: u32,
     /// Whether it holds first hits.
@@ -112,8 +105,6 @@ pub(super) struct Origin {
 pub(super) struct Cell {
     /// Which cell it is.
     pub(super) origin: Origin,
-    /// Whether it has been halved: it then serves only where a half is missing.
-    pub(super) split: bool,
     /// Points of the cell, at most [`PROBES`].
     pub(super) probes: Vec<Receiver>,
     /// The cut, in tree order: its entries' lights are all lights, each once.
@@ -122,6 +113,8 @@ pub(super) struct Cell {
     firsts: Vec<u32>,
     /// The learned weights, ready for use.
     weights: Weights,
+    /// Where in the cell which entry was visible.
+    subcells: SubCells,
     /// Observations so far, and when the weights were last made.
     pub(super) seen: f32,
     built_at: f32,
@@ -131,47 +124,21 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    fn empty(origin: Origin, points: &[Receiver]) -> Self {
+    /// A new cell at its first observed points: a cut from the tree's own importance.
+    pub(super) fn new(origin: Origin, points: &[Receiver], tree: &Tree) -> Self {
         let step = points.len().div_ceil(PROBES).max(1);
-        Self {
+        let mut cell = Self {
             origin,
-            split: false,
             probes: points.iter().step_by(step).copied().collect(),
             entries: Vec::with_capacity(FIRST_ENTRIES + MAX_LEAF_LIGHTS),
             firsts: Vec::new(),
             weights: Weights::default(),
+            subcells: SubCells::new(),
             seen: 0.0,
             built_at: 0.0,
             refined_at: 0.0,
             total: 0.0,
-        }
-    }
-
-    /// A half of `parent`: it starts with the parent's cut and with what is known from there.
-    pub(super) fn half(origin: Origin, parent: &Self, points: &[Receiver], tree: &Tree) -> Self {
-        let mut cell = Self::empty(origin, points);
-        for known in &parent.entries {
-            let seen = known.visible > 0.0;
-            let most = if seen { INHERITED_COUNT } else { INHERITED_UNSEEN };
-            let kept = most / known.drawn.max(most);
-            let entry = Entry {
-                scale: cell.scale(&known.emitter(tree)),
-                drawn: known.drawn * kept,
-                visible: known.visible * kept,
-                sum_sq: known.sum_sq * kept,
-                // What was never visible stays known as such.
-                prior: if seen { known.ratio() } else { known.prior },
-                ..*known
-            };
-            cell.entries.push(entry);
-        }
-        cell.build(tree);
-        cell
-    }
-
-    /// A new cell at its first observed points: a cut from the tree's own importance.
-    pub(super) fn new(origin: Origin, points: &[Receiver], tree: &Tree) -> Self {
-        let mut cell = Self::empty(origin, points);
+        };
         if !tree.leaves.is_empty() {
             cell.entries.push(cell.unseen(tree, Branch::ROOT));
         }
@@ -240,29 +207,24 @@ impl Cell {
         self.firsts.partition_point(|&first| first <= position) - 1
     }
 
-    /// The entry at position `x` of an interval of `width` (at most 2^52), as it is cut at a point; `None` if nothing
-    /// arrives there.
+    /// Around a point in one of its cubes.
     #[inline]
-    pub(super) fn draw(&self, receiver: &Receiver, x: u64, width: u64) -> Option<Part> {
-        self.weights.find(receiver, Wanted::At(x), width)
-    }
-
-    /// The same for several positions.
-    #[inline]
-    pub(super) fn draw_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        self.weights.find_each(receiver, wanted, width, parts);
-    }
-
-    /// The entry that holds the light at `position` in tree order, and its part of the interval.
-    #[inline]
-    pub(super) fn part_of(&self, receiver: &Receiver, position: u32, width: u64) -> Option<Part> {
-        self.weights
-            .find(receiver, Wanted::Entry(self.entry_of(position)), width)
+    pub(super) fn around(&self, cube: Cube) -> Nearby<'_> {
+        Nearby {
+            cell: self,
+            factors: self.subcells.factors(cube),
+        }
     }
 
     /// Learns from the cell's observations of one frame, in order. `unit`: what the tree's importance is measured in.
-    pub(super) fn learn<'o>(&mut self, tree: &Tree, unit: f32, observations: impl Iterator<Item = &'o Observation>) {
-        for o in observations {
+    pub(super) fn learn<'o>(
+        &mut self,
+        tree: &Tree,
+        unit: f32,
+        may_grow: bool,
+        observations: impl Iterator<Item = &'o (&'o Observation, Cube)>,
+    ) {
+        for &(o, cube) in observations {
             let place = tree.rank[o.light as usize];
             let j = self.entry_of(place);
             let receiver = Receiver::from(&o.point);
@@ -274,21 +236,40 @@ impl Cell {
             if within > 0.0 && estimate > 0.0 {
                 let ratio = o.irradiance / (within * unit * estimate);
                 self.entries[j].observe(ratio, o.visible, self.total / estimate);
+                self.subcells.observe(cube, j, o.visible, self.entries.len(), may_grow);
             }
             self.seen += 1.0;
         }
         if self.seen >= 2.0 * self.refined_at.max(8.0) {
+            let old: Vec<Branch> = self.branches().collect();
             self.refine(tree);
+            let new: Vec<Branch> = self.branches().collect();
+            self.subcells.recut(tree, &old, &new);
             self.refined_at = self.seen;
             self.build(tree);
+            self.subcells.refresh(&self.counts(), true);
+            return;
         } else if self.seen >= REBUILD_GROWTH * self.built_at {
             self.build(tree);
         }
+        self.subcells.refresh(&self.counts(), false);
     }
 
-    /// Whether enough has been seen for finer cells to pay.
-    pub(super) fn wants_halves(&self) -> bool {
-        !self.split && self.seen >= HALVE_AT
+    /// How many of its cubes anything was seen in.
+    pub(super) fn cubes(&self) -> usize {
+        self.subcells.len()
+    }
+
+    fn branches(&self) -> impl Iterator<Item = Branch> {
+        self.entries.iter().map(|entry| entry.branch)
+    }
+
+    fn counts(&self) -> Vec<Count> {
+        let of = |entry: &Entry| Count {
+            drawn: entry.drawn,
+            visible: entry.visible,
+        };
+        self.entries.iter().map(of).collect()
     }
 
     /// Bytes held.
@@ -297,6 +278,7 @@ impl Cell {
             + self.entries.capacity() * size_of::<Entry>()
             + self.firsts.capacity() * size_of::<u32>()
             + self.weights.bytes()
+            + self.subcells.bytes()
             + self.probes.capacity() * size_of::<Receiver>()
     }
 
@@ -359,5 +341,43 @@ impl Cell {
             .extend(self.entries.iter().map(|entry| entry.branch.first(tree)));
         let learned: Vec<_> = self.entries.iter().map(|e| (e.branch, e.learned(tree))).collect();
         self.weights = Weights::new(&learned);
+    }
+}
+
+/// A cell as seen from one of its cubes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Nearby<'c> {
+    cell: &'c Cell,
+    /// By which the weights are multiplied; empty for 1.
+    factors: &'c [Lanes],
+}
+
+impl Nearby<'_> {
+    /// The entry at position `x` of an interval of `width` (at most 2^52), as it is cut at a point; `None` if nothing
+    /// arrives there.
+    #[inline]
+    pub(super) fn draw(&self, receiver: &Receiver, x: u64, width: u64) -> Option<Part> {
+        self.find(receiver, Wanted::At(x), width)
+    }
+
+    /// The same for several positions.
+    #[inline]
+    pub(super) fn draw_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+        self.cell
+            .weights
+            .find_each(receiver, self.factors, wanted, width, parts);
+    }
+
+    /// The entry that holds the light at `position` in tree order, and its part of the interval.
+    #[inline]
+    pub(super) fn part_of(&self, receiver: &Receiver, position: u32, width: u64) -> Option<Part> {
+        self.find(receiver, Wanted::Entry(self.cell.entry_of(position)), width)
+    }
+
+    #[inline]
+    fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
+        let mut part = [None];
+        self.draw_each(receiver, &[wanted], width, &mut part);
+        part[0]
     }
 }

@@ -1,9 +1,10 @@
 //! Where a point belongs: world-space cells, hashed.
 //!
 //! A cell is a cube of a size that grows with the distance from the eye (so that it spans about the same number of
-//! pixels everywhere), split by the dominant direction of the normal and by first or later hit. Cf. Binder, Fricke and
+//! pixels everywhere), told apart by the dominant direction of the normal and by first or later hit. Cf. Binder, Fricke and
 //! Keller 2019 (Massively parallel path space filtering, section 3) for hashing position, level and normal.
 
+use super::subcells::{self, Cube};
 use crate::ShadingPoint;
 use glam::Vec3;
 use sampling::hash::mix;
@@ -12,15 +13,13 @@ use sampling::hash::mix;
 pub(super) const NO_CELL: u32 = u32::MAX;
 
 /// Edge of the largest cells as seen from the eye, in radians.
-const CELL_ANGLE: f32 = 0.25;
-/// How often a cell may be halved, as observations come in.
-const MAX_HALVINGS: u32 = 3;
-/// Marks the value of a slot whose cell has been split.
-const SPLIT: u32 = 1 << 31;
+const CELL_ANGLE: f32 = 0.5;
 /// Cells of later hits are this many times larger: they are visited more thinly.
 const SECONDARY_SCALE: f32 = 4.0;
-/// The smallest cell, as a share of the scene's radius.
-const MIN_SIZE: f32 = 1.0 / 2048.0;
+/// The smallest cube, as a share of the scene's radius.
+const MIN_SIZE: f32 = 1.0 / 4096.0;
+/// No cell is larger than 2 to this power times the smallest cube.
+const MAX_LEVEL: u32 = 31;
 
 /// Maps keys to cells: open addressing, frozen during a frame.
 #[derive(Debug)]
@@ -53,52 +52,28 @@ impl Grid {
         self.slots.capacity() * size_of::<(u64, u32)>()
     }
 
-    /// The level of the largest cell at a point: its edge is 2^level times the smallest.
+    /// Where a point is.
     #[inline]
-    fn top_level(&self, point: &ShadingPoint) -> u32 {
+    pub(super) fn locate(&self, point: &ShadingPoint) -> Spot {
         let scale = if point.primary { 1.0 } else { SECONDARY_SCALE };
         let wanted = point.position_ws.distance(self.eye_ws) * CELL_ANGLE * scale;
         // The exponent of the ratio, read from its bits: floor(log2), at least 0.
-        ((wanted / self.min_size).max(1.0).to_bits() >> 23)
-            .saturating_sub(127)
-            .min(31)
-    }
-
-    #[inline]
-    fn key(&self, spot: &Spot, level: u32) -> u64 {
-        // 2^-level, by its bits.
-        let [x, y, z] = (spot.position * f32::from_bits((127 - level) << 23))
+        let level = ((wanted / self.min_size).max(1.0).to_bits() >> 23).saturating_sub(127);
+        let level = level.clamp(subcells::LEVELS, MAX_LEVEL);
+        let position = (point.position_ws - self.center_ws) * self.inverse_min_size;
+        let [x, y, z] = (position * power_of_two(subcells::LEVELS as i32 - level as i32))
             .to_array()
-            .map(|c| u64::from(floor(c) as u32 & 0xf_ffff));
-        // 3 x 20 bits of position; level, normal and kind are mixed in. Two cells that clash share a distribution:
-        // that costs noise and nothing else.
-        let tag = u64::from(mix(level << 8 | spot.kind));
-        (x | y << 20 | z << 40) ^ (tag << 32 | tag)
-    }
-
-    /// The finest cell at a point.
-    #[inline]
-    pub(super) fn locate(&self, point: &ShadingPoint) -> Place {
-        let top = self.top_level(point);
-        let spot = Spot {
-            position: (point.position_ws - self.center_ws) * self.inverse_min_size,
-            kind: dominant_axis(point.normal_ws) << 1 | u32::from(point.primary),
-        };
-        // From the finest up: after a while most points are in one of the finest.
-        let mut missing: Option<Missing> = None;
-        for level in top.saturating_sub(MAX_HALVINGS)..=top {
-            let key = self.key(&spot, level);
-            let value = self.find(key);
-            if value != NO_CELL {
-                let halved = value & SPLIT != 0;
-                return Place {
-                    cell: value & !SPLIT,
-                    missing: missing.filter(|_| halved),
-                };
-            }
-            missing = Some(Missing { key, level });
+            .map(floor);
+        let kind = dominant_axis(point.normal_ws) << 1 | u32::from(point.primary);
+        // 3 x 20 bits of position; the rest is mixed in. Two cells that clash share a distribution: that costs noise and
+        // nothing else.
+        let bits = |c: i32| u64::from((c >> subcells::LEVELS) as u32 & 0xf_ffff);
+        let tag = u64::from(mix(level << 8 | kind));
+        Spot {
+            key: (bits(x) | bits(y) << 20 | bits(z) << 40) ^ (tag << 32 | tag),
+            cube: Cube::at([x, y, z]),
+            level,
         }
-        Place { cell: NO_CELL, missing }
     }
 
     /// Centre and edge, world space, of the cell of `level` that holds a position.
@@ -113,7 +88,7 @@ impl Grid {
         (key.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> (64 - self.slots.len().trailing_zeros())) as usize
     }
 
-    /// The cell with this key, or [`NO_CELL`]; marked if it has been split.
+    /// The cell with this key, or [`NO_CELL`].
     #[inline]
     pub(super) fn find(&self, key: u64) -> u32 {
         self.slots[self.probe(key)].1
@@ -127,12 +102,6 @@ impl Grid {
             at = (at + 1) & (self.slots.len() - 1);
         }
         at
-    }
-
-    /// From now on points of this cell look for a finer one.
-    pub(super) fn split(&mut self, key: u64) {
-        let at = self.probe(key);
-        self.slots[at].1 |= SPLIT;
     }
 
     /// Adds a key that is not there yet.
@@ -153,28 +122,19 @@ impl Grid {
 
 /// Where a point lies in the grid.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
-    /// The finest cell that exists, or [`NO_CELL`].
-    pub(super) cell: u32,
-    /// The cell that ought to be made here, if one is missing.
-    pub(super) missing: Option<Missing>,
-}
-
-/// A cell that does not exist yet.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Missing {
-    /// Its key.
+pub(super) struct Spot {
+    /// Key of its cell.
     pub(super) key: u64,
-    /// Its level.
+    /// Where in the cell.
+    pub(super) cube: Cube,
+    /// Level of the cell: its edge is 2^level times that of the smallest cube.
     pub(super) level: u32,
 }
 
-/// What the keys of all levels at a point have in common.
-struct Spot {
-    /// In edges of the smallest cells.
-    position: Vec3,
-    /// Side that the normal faces, first or later hit.
-    kind: u32,
+/// 2^exponent, by its bits.
+#[inline]
+fn power_of_two(exponent: i32) -> f32 {
+    f32::from_bits(((127 + exponent) as u32) << 23)
 }
 
 /// The largest whole number that is not above `x`: the library's floor is a call where the target lacks the instruction.

@@ -16,6 +16,7 @@ mod cell;
 mod cells;
 mod emitter;
 mod grid;
+mod subcells;
 mod weights;
 
 use crate::schedule::Schedule;
@@ -24,7 +25,7 @@ use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
     TreeVisibleSampler, records,
 };
-use cell::Cell;
+use cell::Nearby;
 use cells::Cells;
 use glam::Vec3;
 use scene::Scene;
@@ -48,7 +49,7 @@ pub struct AdaptiveSampler {
     table: TableSampler,
     cells: Cells,
     /// The table's part of 32-bit random numbers.
-    first_mass: u32,
+    table_mass: u32,
     /// Which frames are learned from.
     schedule: Schedule,
     /// Frames done.
@@ -71,7 +72,7 @@ pub struct Local<'a> {
 #[derive(Debug)]
 enum Source<'a> {
     /// What has been learned around the point.
-    Cell(&'a Cell),
+    Cell(Nearby<'a>),
     /// Nothing has been learned there yet: the tree as it is.
     Tree(Descent<'a>),
     /// No light can contribute.
@@ -100,12 +101,11 @@ impl AdaptiveSampler {
             min_probability_mass: (floor / share) as f32,
             ..settings.clone()
         };
-        let first_mass = (share * 4_294_967_296.0) as u32;
         Self {
             prior: TreeVisibleSampler::prior(lights, settings),
             table: TableSampler::net(lights, scene.radius, &within_table),
             cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
-            first_mass,
+            table_mass: (share * 4_294_967_296.0) as u32,
             schedule: Schedule::default(),
             frames: 0,
             settings: settings.clone(),
@@ -141,7 +141,7 @@ impl LightSampler for AdaptiveSampler {
     #[inline]
     fn local(&self, scene: &Scene, point: &ShadingPoint) -> Local<'_> {
         let source = match self.cells.at(point) {
-            Some(cell) => Source::Cell(cell),
+            Some(nearby) => Source::Cell(nearby),
             None => {
                 let descent = Descent::new(self.tree(), point.into());
                 if descent.alive() {
@@ -162,35 +162,29 @@ impl LightSampler for AdaptiveSampler {
     #[inline]
     fn sample(&self, local: &Local<'_>, u: u32) -> Option<Choice> {
         let x = position(u, local.salt);
-        let table_width = width(self.first_mass.into());
+        let table_width = self.table_width();
         let (place, own) = match &local.source {
             Source::Nothing => return None,
-            _ if x < table_width => {
-                let stretched = (u128::from(x) << 32) / u128::from(table_width);
-                let light = self.table.sample(&local.table, stretched as u32)?.light;
-                let pmf = self.pmf(local, light);
-                return (pmf > 0.0).then_some(Choice { light, pmf });
-            }
+            _ if x < table_width => return self.sample_table(local, x),
             Source::Tree(descent) => descent.draw(x - table_width, UNIT - table_width),
             Source::Cell(cell) => {
-                let x = x - table_width;
-                let part = cell.draw(&local.receiver, x >> CELL_SHIFT, self.cell_width())?;
-                self.within(local, &part, x)
+                let part = cell.draw(
+                    &local.receiver,
+                    (x - table_width) >> CELL_SHIFT,
+                    (UNIT - table_width) >> CELL_SHIFT,
+                )?;
+                self.within(local, &part, x - table_width)
             }
         };
-        let light = self.tree().light_at(place);
-        Some(Choice {
-            light,
-            pmf: probability(own) + self.table_pmf(local, light),
-        })
+        Some(self.choice(local, place, own))
     }
 
     fn sample_each(&self, local: &Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
-        let table_width = width(self.first_mass.into());
         let Source::Cell(cell) = &local.source else {
             let each = choices.iter_mut().zip(us);
             return each.for_each(|(choice, &u)| *choice = self.sample(local, u));
         };
+        let table_width = self.table_width();
         for (us, choices) in us.chunks(EACH).zip(choices.chunks_mut(EACH)) {
             let mut wanted = [Wanted::At(0); EACH];
             let mut parts = [None; EACH];
@@ -200,19 +194,17 @@ impl LightSampler for AdaptiveSampler {
             cell.draw_each(
                 &local.receiver,
                 &wanted[..us.len()],
-                self.cell_width(),
+                (UNIT - table_width) >> CELL_SHIFT,
                 &mut parts[..us.len()],
             );
             for ((choice, &u), part) in choices.iter_mut().zip(us).zip(&parts) {
                 let x = position(u, local.salt);
                 *choice = if x < table_width {
-                    self.sample(local, u)
+                    self.sample_table(local, x)
                 } else {
                     part.map(|part| {
                         let (place, own) = self.within(local, &part, x - table_width);
-                        let light = self.tree().light_at(place);
-                        let pmf = probability(own) + self.table_pmf(local, light);
-                        Choice { light, pmf }
+                        self.choice(local, place, own)
                     })
                 };
             }
@@ -222,12 +214,13 @@ impl LightSampler for AdaptiveSampler {
     #[inline]
     fn pmf(&self, local: &Local<'_>, light: u32) -> f32 {
         let place = self.tree().rank[light as usize];
+        let rest = UNIT - self.table_width();
         let own = match &local.source {
             Source::Nothing => return 0.0,
-            Source::Tree(descent) => descent.width_of(place, UNIT - width(self.first_mass.into())),
+            Source::Tree(descent) => descent.width_of(place, rest),
             Source::Cell(cell) => {
                 // Where nothing can arrive nothing is drawn, not by the table either.
-                let Some(part) = cell.part_of(&local.receiver, place, self.cell_width()) else {
+                let Some(part) = cell.part_of(&local.receiver, place, rest >> CELL_SHIFT) else {
                     return 0.0;
                 };
                 let own = part.width << CELL_SHIFT;
@@ -237,7 +230,7 @@ impl LightSampler for AdaptiveSampler {
                 }
             }
         };
-        probability(own) + self.table_pmf(local, light)
+        self.choice(local, place, own).pmf
     }
 
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
@@ -260,7 +253,7 @@ impl LightSampler for AdaptiveSampler {
         SamplerStats {
             bytes: self.tree().bytes() + table.bytes + self.cells.bytes(),
             cells: self.cells.len(),
-            min_probability: table.min_probability * f64::from(self.first_mass) / 4_294_967_296.0,
+            min_probability: table.min_probability * f64::from(self.table_mass) / 4_294_967_296.0,
             build_s: self.build_s,
             learn_s: self.learn_s,
             skipped: Vec::new(),
@@ -278,10 +271,29 @@ impl LightSampler for AdaptiveSampler {
 }
 
 impl AdaptiveSampler {
-    /// The width that is cut among the entries of a cell.
+    /// What the table has of the range of random numbers.
     #[inline]
-    fn cell_width(&self) -> u64 {
-        (UNIT - width(self.first_mass.into())) >> CELL_SHIFT
+    fn table_width(&self) -> u64 {
+        width(self.table_mass.into())
+    }
+
+    /// The light at position `x` of that.
+    fn sample_table(&self, local: &Local<'_>, x: u64) -> Option<Choice> {
+        let stretched = (u128::from(x) << 32) / u128::from(self.table_width());
+        let light = self.table.sample(&local.table, stretched as u32)?.light;
+        let pmf = self.pmf(local, light);
+        (pmf > 0.0).then_some(Choice { light, pmf })
+    }
+
+    /// The light at `place` in tree order, of which `own` is the width that the cell or the tree gives it.
+    #[inline]
+    fn choice(&self, local: &Local<'_>, place: u32, own: u64) -> Choice {
+        let light = self.tree().light_at(place);
+        let of_table = self.table.pmf(&local.table, light) * (self.table_mass as f32 / 4_294_967_296.0);
+        Choice {
+            light,
+            pmf: probability(own) + of_table,
+        }
     }
 
     /// The light at position `x` (within what the table leaves), given the entry there; returns its place in tree order and its own width.
@@ -298,11 +310,6 @@ impl AdaptiveSampler {
     #[inline]
     fn inside(&self, local: &Local<'_>) -> Descent<'_> {
         Descent::inside(self.tree(), local.receiver)
-    }
-
-    #[inline]
-    fn table_pmf(&self, local: &Local<'_>, light: u32) -> f32 {
-        self.table.pmf(&local.table, light) * (self.first_mass as f32 / 4_294_967_296.0)
     }
 }
 

@@ -11,11 +11,12 @@ use crate::tree::Receiver;
 use glam::Vec3;
 
 /// Entries of a row.
-const LANES: usize = 16;
+pub(super) const LANES: usize = 16;
 /// Rows of the longest cut.
 const MAX_ROWS: usize = super::cell::MAX_ENTRIES.div_ceil(LANES);
 
-type Lanes = [f32; LANES];
+/// A number for every lane of a row.
+pub(super) type Lanes = [f32; LANES];
 
 /// One entry of every lane.
 #[derive(Clone, Debug)]
@@ -132,56 +133,83 @@ impl Weights {
         self.rows.capacity() * size_of::<Row>() + self.attenuation.capacity() * size_of::<Attenuation>()
     }
 
-    /// The part that holds `wanted`, of an interval of `width`, which is at most 2^52, cut in proportion to the weights at a
-    /// point; `None` if all are zero.
-    #[inline]
-    pub(super) fn find(&self, receiver: &Receiver, wanted: Wanted, width: u64) -> Option<Part> {
-        let mut part = [None];
-        self.find_each(receiver, &[wanted], width, &mut part);
-        part[0]
-    }
-
-    /// The same for each of `wanted`; the weights are worked out once.
+    /// For each of `wanted` the part that holds it, of an interval of `width`, which is at most 2^52, cut in proportion to the
+    /// weights at a point times `factors` (empty for 1); `None` if all are zero. The weights are worked out once.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[allow(unsafe_code, reason = "compiled for instructions that not every processor has")]
-    pub(super) fn find_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
+    pub(super) fn find_each(
+        &self,
+        receiver: &Receiver,
+        factors: &[Lanes],
+        wanted: &[Wanted],
+        width: u64,
+        parts: &mut [Option<Part>],
+    ) {
         if is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512dq")
         {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx512(receiver, wanted, width, parts) }
+            unsafe { self.find_avx512(receiver, factors, wanted, width, parts) }
         } else if is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx2(receiver, wanted, width, parts) }
+            unsafe { self.find_avx2(receiver, factors, wanted, width, parts) }
         } else {
-            self.find_anywhere(receiver, wanted, width, parts);
+            self.find_anywhere(receiver, factors, wanted, width, parts);
         }
     }
 
     /// The same on other processors.
     #[cfg(not(target_arch = "x86_64"))]
     #[inline]
-    pub(super) fn find_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        self.find_anywhere(receiver, wanted, width, parts);
+    pub(super) fn find_each(
+        &self,
+        receiver: &Receiver,
+        factors: &[Lanes],
+        wanted: &[Wanted],
+        width: u64,
+        parts: &mut [Option<Part>],
+    ) {
+        self.find_anywhere(receiver, factors, wanted, width, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
-    fn find_avx512(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        self.find_anywhere(receiver, wanted, width, parts);
+    fn find_avx512(
+        &self,
+        receiver: &Receiver,
+        factors: &[Lanes],
+        wanted: &[Wanted],
+        width: u64,
+        parts: &mut [Option<Part>],
+    ) {
+        self.find_anywhere(receiver, factors, wanted, width, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn find_avx2(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        self.find_anywhere(receiver, wanted, width, parts);
+    fn find_avx2(
+        &self,
+        receiver: &Receiver,
+        factors: &[Lanes],
+        wanted: &[Wanted],
+        width: u64,
+        parts: &mut [Option<Part>],
+    ) {
+        self.find_anywhere(receiver, factors, wanted, width, parts);
     }
 
     #[inline(always)]
-    fn find_anywhere(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        let (weights, lanes) = self.evaluate(receiver);
+    fn find_anywhere(
+        &self,
+        receiver: &Receiver,
+        factors: &[Lanes],
+        wanted: &[Wanted],
+        width: u64,
+        parts: &mut [Option<Part>],
+    ) {
+        let (weights, lanes) = self.evaluate(receiver, factors);
         let Some(cut) = Cut::new(&lanes, width) else {
             parts.fill(None);
             return;
@@ -213,28 +241,34 @@ impl Weights {
         }
     }
 
-    /// All weights, and the sums of the lanes.
+    /// All weights times `factors`, and the sums of the lanes.
     #[inline(always)]
-    fn evaluate(&self, receiver: &Receiver) -> ([Lanes; MAX_ROWS], Lanes) {
+    fn evaluate(&self, receiver: &Receiver, factors: &[Lanes]) -> ([Lanes; MAX_ROWS], Lanes) {
         let mut all = [[0.0; LANES]; MAX_ROWS];
         let mut lanes = [0.0; LANES];
         for (index, (row, weights)) in self.rows.iter().zip(&mut all).enumerate() {
             if let Some(attenuation) = self.attenuation.get(index) {
-                for lane in 0..LANES {
+                for (lane, weight) in weights.iter_mut().enumerate() {
                     let emitter = Emitter {
                         cone_scale: attenuation.cone_scale[lane],
                         cone_offset: attenuation.cone_offset[lane],
                         inverse_range_sq: attenuation.inverse_range_sq[lane],
                         ..row.emitter(lane)
                     };
-                    weights[lane] = emitter.importance::<true>(receiver);
-                    lanes[lane] += weights[lane];
+                    *weight = emitter.importance::<true>(receiver);
                 }
             } else {
-                for lane in 0..LANES {
-                    weights[lane] = row.emitter(lane).importance::<false>(receiver);
-                    lanes[lane] += weights[lane];
+                for (lane, weight) in weights.iter_mut().enumerate() {
+                    *weight = row.emitter(lane).importance::<false>(receiver);
                 }
+            }
+            if let Some(factors) = factors.get(index) {
+                for (weight, factor) in weights.iter_mut().zip(factors) {
+                    *weight *= factor;
+                }
+            }
+            for (sum, weight) in lanes.iter_mut().zip(weights) {
+                *sum += *weight;
             }
         }
         (all, lanes)
@@ -367,20 +401,28 @@ mod tests {
             entries.push((branch, Emitter::of(&tree, branch)));
         }
         let weights = Weights::new(&entries);
+        let dimmed: Vec<Lanes> = (0..8)
+            .map(|row| std::array::from_fn(|lane| 1.0 / (1 + row * lane) as f32))
+            .collect();
         for (i, point) in (0..).zip(points(200, 5)) {
             let receiver = Receiver::from(&point);
+            let factors = if i % 2 == 0 { &[][..] } else { &dimmed };
             let x = sampling::Random::new(1, i, 0).u32(0);
             for wanted in [
                 Wanted::At(u64::from(x) << 19),
                 Wanted::Entry(x as usize % entries.len()),
             ] {
                 let mut portable = [None];
-                weights.find_anywhere(&receiver, &[wanted], WIDTH, &mut portable);
-                assert_eq!(weights.find(&receiver, wanted, WIDTH), portable[0]);
+                weights.find_anywhere(&receiver, factors, &[wanted], WIDTH, &mut portable);
+                let mut fastest = [None];
+                weights.find_each(&receiver, factors, &[wanted], WIDTH, &mut fastest);
+                assert_eq!(fastest, portable);
             }
             let mut end = 0;
             for entry in 0..entries.len() {
-                let Some(part) = weights.find(&receiver, Wanted::Entry(entry), WIDTH) else {
+                let mut part = [None];
+                weights.find_each(&receiver, factors, &[Wanted::Entry(entry)], WIDTH, &mut part);
+                let [Some(part)] = part else {
                     end = WIDTH; // nothing arrives here
                     break;
                 };
