@@ -15,12 +15,12 @@ use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 /// Most entries of a cut. Higher values resolve more lights one by one; lower values learn faster and cost less.
 pub(super) const MAX_ENTRIES: usize = 128;
 /// Entries of a new cell's cut.
-const FIRST_ENTRIES: usize = 48;
+const FIRST_ENTRIES: usize = 96;
 /// How many observations the prior is worth.
 const PRIOR_COUNT: f32 = 2.0;
 /// Part of the prior that does not fade with what was learned. Higher values waste samples on hidden lights; lower values
 /// leave bright specks where a light reaches a few points of a cell only.
-const LASTING_PRIOR: f32 = 0.03;
+const LASTING_PRIOR: f32 = 0.1;
 /// Entries of at least this share of the whole weight that are clusters are split.
 const SPLIT_SHARE: f32 = 0.5 / MAX_ENTRIES as f32;
 /// Sibling entries that together have less than this share of the whole weight may be merged.

@@ -33,7 +33,7 @@ use std::time::Instant;
 use weights::{Part, Wanted};
 
 /// Share of the samples that goes to the global table. Higher values find lights sooner that a cell has overlooked; lower values waste less.
-const TABLE_SHARE: f64 = 0.03;
+const TABLE_SHARE: f64 = 0.01;
 
 /// Entries of a cell are drawn with 52 bits, which `f64` holds exactly; what is below goes to the lights within an entry.
 const CELL_SHIFT: u32 = 11;
