@@ -14,7 +14,7 @@ const LAYERS: [u32; 2] = [2, LEVELS];
 pub(super) const LEVELS: u32 = 4;
 /// How many observations the share around a cube is worth in it.
 const PRIOR_COUNT: f32 = 4.0;
-/// See [`super::cell::LASTING_PRIOR`].
+/// Part of the prior that does not fade, as in the whole cell: what was not visible so far may still be, to few points.
 const LASTING_PRIOR: f32 = 0.03;
 /// Factors are made anew when the cube has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
