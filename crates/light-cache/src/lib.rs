@@ -206,7 +206,13 @@ pub trait LightSampler: Debug + Send + Sync {
         1.0
     }
 
-    /// Learns from a frame. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
+    /// How often it has learned, that is, changed what it draws because of what was drawn. Random numbers that come after a lesson must be
+    /// independent of those before it.
+    fn lessons(&self) -> u32 {
+        0
+    }
+
+    /// Learns from a frame, or keeps it for later. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
 
     /// What it can tell about itself.

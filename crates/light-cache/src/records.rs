@@ -133,6 +133,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.frame_weight()
     }
 
+    fn lessons(&self) -> u32 {
+        self.inner.lessons()
+    }
+
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.inner.set_eye(eye_ws);
     }

@@ -317,6 +317,10 @@ impl LightSampler for TableSampler {
         self.schedule.frame_weight()
     }
 
+    fn lessons(&self) -> u32 {
+        self.schedule.lessons()
+    }
+
     fn set_eye(&mut self, _eye_ws: Vec3) {
         self.schedule.restart();
     }
@@ -332,6 +336,7 @@ impl LightSampler for TableSampler {
         let floor = self.primary.distribution.as_ref().map_or(0.0, Discrete::floor);
         SamplerStats {
             bytes: self.primary.bytes()
+                + self.schedule.bytes()
                 + self.secondary.as_ref().map_or(0, Table::bytes)
                 + size_of_val(&self.prior[..])
                 + self.brightness.bytes(),

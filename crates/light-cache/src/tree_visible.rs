@@ -162,6 +162,10 @@ impl LightSampler for TreeVisibleSampler {
         self.schedule.frame_weight()
     }
 
+    fn lessons(&self) -> u32 {
+        self.schedule.lessons()
+    }
+
     fn set_eye(&mut self, _eye_ws: Vec3) {
         self.schedule.restart();
     }
@@ -174,7 +178,7 @@ impl LightSampler for TreeVisibleSampler {
 
     fn stats(&self) -> SamplerStats {
         SamplerStats {
-            bytes: self.tree.bytes() + self.visibility.bytes(),
+            bytes: self.tree.bytes() + self.visibility.bytes() + self.schedule.bytes(),
             min_probability: self.floor.probability(),
             build_s: self.build_s,
             learn_s: self.learn_s,

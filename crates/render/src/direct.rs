@@ -73,6 +73,11 @@ pub(crate) trait DirectLight: Sync + Send {
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
 
+    /// How often what is drawn has changed, see [`LightSampler::lessons`].
+    fn lessons(&self) -> u32 {
+        0
+    }
+
     /// Weight of the next frame's samples, see [`LightSampler::frame_weight`].
     fn frame_weight(&self) -> f32 {
         1.0
@@ -176,6 +181,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
     #[inline]
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32 {
         self.0.pmf(local, light)
+    }
+
+    fn lessons(&self) -> u32 {
+        self.0.lessons()
     }
 
     fn frame_weight(&self) -> f32 {

@@ -199,6 +199,8 @@ pub(crate) trait Frames: Send {
 /// Frames with one way of finding direct light.
 struct Drawn<D> {
     direct: D,
+    /// The frame with which the current sequence of random numbers began.
+    first_frame: u32,
     /// What the last frame observed, one list per tile.
     observations: Vec<Vec<Observation>>,
 }
@@ -207,6 +209,7 @@ impl<D> Drawn<D> {
     fn new(direct: D) -> Self {
         Self {
             direct,
+            first_frame: 0,
             observations: Vec::new(),
         }
     }
@@ -221,7 +224,7 @@ impl<D: DirectLight> Frames for Drawn<D> {
     /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
     /// nothing and their number changes nothing.
     fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
-        let view = eye.view(&self.direct);
+        let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
         film.set_weight(self.direct.frame_weight());
         let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
         let counters = tiles.map(|(tile, observations)| {
@@ -234,7 +237,12 @@ impl<D: DirectLight> Frames for Drawn<D> {
             log.counters
         });
         let counters = counters.reduce(Counters::default, Counters::add);
+        let lessons = self.direct.lessons();
         self.direct.end_frame(eye.scene, &self.observations);
+        if self.direct.lessons() != lessons {
+            // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
+            self.first_frame = eye.frame.wrapping_add(1);
+        }
         counters
     }
 

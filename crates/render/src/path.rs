@@ -6,6 +6,7 @@ use crate::filter::FilterSampler;
 use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
+use sampling::hash::hash2;
 use sampling::{PixelSequence, first_vertices, mis, unit_f32};
 #[cfg(target_arch = "x86_64")]
 use scene::bvh::Kernel;
@@ -30,7 +31,7 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) image_width: u32,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u64,
-    /// Number of the frame = sample number of every pixel.
+    /// Number of the frame in its sequence of random numbers = sample number of every pixel.
     pub(crate) frame: u32,
     /// Lights drawn at the first surface.
     pub(crate) light_samples: u32,
@@ -39,6 +40,16 @@ pub(crate) struct FrameView<'f, D> {
 }
 
 impl<D> FrameView<'_, D> {
+    /// The same frame with random numbers of the sequence that began with frame `first`, which are independent of those of all others.
+    pub(crate) fn in_sequence_since(mut self, first: u32) -> Self {
+        if first > 0 {
+            let [high, low] = [1, 2].map(|i| u64::from(hash2(first, i)));
+            self.seed ^= high << 32 | low;
+            self.frame = self.frame.wrapping_sub(first);
+        }
+        self
+    }
+
     /// The points of the sequence that the light samples of this frame take: together they are the first points of it,
     /// stratified in every power of two, frame by frame and all frames together.
     #[inline(always)]

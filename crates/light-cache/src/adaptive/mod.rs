@@ -128,6 +128,10 @@ impl LightSampler for AdaptiveSampler {
         self.schedule.frame_weight()
     }
 
+    fn lessons(&self) -> u32 {
+        self.schedule.lessons()
+    }
+
     /// What was learned may be wrong anywhere, and is learned again in a few frames.
     fn scene_changed(&mut self, scene: &Scene) {
         *self = Self::new(scene, &self.settings);
@@ -251,7 +255,7 @@ impl LightSampler for AdaptiveSampler {
     fn stats(&self) -> SamplerStats {
         let table = self.table.stats();
         SamplerStats {
-            bytes: self.tree().bytes() + table.bytes + self.cells.bytes(),
+            bytes: self.tree().bytes() + table.bytes + self.cells.bytes() + self.schedule.bytes(),
             cells: self.cells.len(),
             min_probability: table.min_probability * f64::from(self.table_mass) / 4_294_967_296.0,
             build_s: self.build_s,
