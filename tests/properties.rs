@@ -131,6 +131,7 @@ fn learn<S: LightSampler>(sampler: &mut S, scene: &Scene, points: &[ShadingPoint
                 irradiance,
                 pmf: choice.pmf,
                 visible: !scene.occluded(&ray, PrimitiveId::NONE, to),
+                weight: 1,
             })
         });
         let log: Vec<Observation> = observations.collect();

@@ -59,10 +59,11 @@ impl Brightness {
         };
         let cell = self.cell(&observation.point);
         let (sum, count) = &mut self.cells[usize::from(cell)];
-        *sum += estimate;
-        *count += 1.0;
-        self.sum += f64::from(estimate);
-        self.count += 1.0;
+        let times = observation.weight as f32;
+        *sum += times * estimate;
+        *count += times;
+        self.sum += f64::from(times * estimate);
+        self.count += f64::from(times);
         cell
     }
 

@@ -77,6 +77,8 @@ pub struct Observation {
     pub pmf: f32,
     /// Whether the shadow ray arrived.
     pub visible: bool,
+    /// How many such observations it stands for: 1, or more if others like it were left out.
+    pub weight: u32,
 }
 
 /// Counters and shares a sampler can tell about itself, for `--stats` and `info`.
@@ -148,6 +150,25 @@ pub struct CellRecord {
     pub age: u64,
 }
 
+/// Where a sampler is in the course of its learning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Weight of the coming frame in the image, above 0: later frames, which know more, are less noisy. By a schedule that is fixed
+    /// beforehand, so that it cannot bias.
+    pub frame_weight: f32,
+    /// How often it has learned, that is, changed what it draws because of what was drawn. Random numbers that come after a
+    /// lesson must be independent of those before it.
+    pub lessons: u32,
+}
+
+impl Pace {
+    /// Of a sampler that does not learn.
+    pub const STEADY: Self = Self {
+        frame_weight: 1.0,
+        lessons: 0,
+    };
+}
+
 /// Chooses lights.
 ///
 /// The associated type [`LightSampler::Local`] holds what is worked out once per shading point and used by every
@@ -160,13 +181,6 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// Whether the sampler wants observations at all; if not, the integrator collects none.
     const LEARNS: bool;
-
-    /// Whether the frame that is being rendered, or comes next, will be learned from: else its log may stay empty. The
-    /// answer changes in [`LightSampler::end_frame`] and [`LightSampler::set_eye`] only.
-    #[inline]
-    fn wants_observations(&self) -> bool {
-        Self::LEARNS
-    }
 
     /// Tells where the eye is, before the first frame and when it has moved: samplers that keep cells make them finer
     /// near it.
@@ -200,16 +214,9 @@ pub trait LightSampler: Debug + Send + Sync {
         }
     }
 
-    /// Weight of the coming frame in the image, above 0 and at most 1: frames from before anything was learned are noisier.
-    /// By a schedule that is fixed beforehand, so that it cannot bias.
-    fn frame_weight(&self) -> f32 {
-        1.0
-    }
-
-    /// How often it has learned, that is, changed what it draws because of what was drawn. Random numbers that come after a lesson must be
-    /// independent of those before it.
-    fn lessons(&self) -> u32 {
-        0
+    /// Where it is in the course of its learning.
+    fn pace(&self) -> Pace {
+        Pace::STEADY
     }
 
     /// Learns from a frame, or keeps it for later. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.

@@ -1,6 +1,6 @@
 //! What `dump` writes about each light, and a wrapper that gathers it around any sampler.
 
-use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
 use glam::Vec3;
 use sampling::hemisphere::uniform_sphere;
 use sampling::{Random, unit_f32};
@@ -129,12 +129,8 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.sample_each(local, us, choices);
     }
 
-    fn frame_weight(&self) -> f32 {
-        self.inner.frame_weight()
-    }
-
-    fn lessons(&self) -> u32 {
-        self.inner.lessons()
+    fn pace(&self) -> Pace {
+        self.inner.pace()
     }
 
     fn set_eye(&mut self, eye_ws: Vec3) {

@@ -3,23 +3,30 @@
 //! Learning changes what is drawn, so it must not know the random numbers that are still to come; but those of one sequence
 //! are anything but independent of each other: each avoids the strata that the ones before it have been in. So frames come in epochs:
 //! within one nothing is learned and the sequence keeps its strata, and after it a new sequence begins
-//! ([`crate::LightSampler::lessons`]). The first epochs are single frames, later ones double
+//! ([`crate::Pace::lessons`]). The first epochs are single frames, later ones double
 //! (cf. Mueller, Gross and Novak 2017, "Practical Path Guiding for Efficient Light-Transport Simulation", section 5).
+//!
+//! Long epochs observe more than is worth learning, all but what was not expected: a light that adds much more than its
+//! probability allowed for. Those observations are kept, and of the others a few, which stand for all.
 
-use crate::Observation;
+use crate::{Observation, Pace};
+use sampling::hash::hash3;
 use std::borrow::Cow;
 
 /// Epochs of one frame each, after the eye has moved; a power of two. Higher values learn sooner; lower values keep more strata.
 const SINGLE_FRAMES: u32 = 4;
-/// Frames at the end of an epoch that are learned from. Higher values learn more; lower values are faster.
+/// Weights of these frames in the image, against 1 for those of the epoch after them: about their inverse variances.
+const FIRST_WEIGHTS: [f32; SINGLE_FRAMES as usize] = [0.0625, 0.5, 0.625, 0.625];
+/// Of how many frames' observations a longer epoch keeps as many. Higher values learn more; lower values are faster.
 const LESSON_FRAMES: u32 = 8;
-/// Observations that are learned from in one frame, at most: larger images are thinned, so that learning costs the same
-/// at any size. Higher values learn more; lower values are faster.
+/// Observations kept of one frame, at most, but for surprising ones: larger images are thinned, so that learning costs the
+/// same at any size. Higher values learn more; lower values are faster.
 const MAX_OBSERVATIONS: usize = 1 << 16;
-
-/// Frames until an image weighs a frame in full. Higher values hide more of the first frames' noise; lower values waste
-/// fewer of their samples.
-const RAMP: u32 = 4;
+/// A sample is surprising that adds this many times the mean of its tile. Higher values are faster; lower values find sooner what was
+/// overlooked.
+const SURPRISE: f32 = 2.0;
+/// The same per observation that each kept one stands for, where that is more: bounds what is kept.
+const SURPRISE_PER_WEIGHT: f32 = 0.25;
 
 /// Where a sampler is in the course of its learning.
 #[derive(Clone, Debug, Default)]
@@ -39,15 +46,15 @@ impl Schedule {
         self.kept.clear();
     }
 
-    /// Weight of the coming frame in the image: the first ones teach more than they show.
-    pub(crate) fn frame_weight(&self) -> f32 {
-        let grown = (self.frame + 1).min(RAMP) as f32 / RAMP as f32;
-        grown * grown
-    }
-
-    /// Times that the sampler has learned.
-    pub(crate) fn lessons(&self) -> u32 {
-        self.lessons
+    /// See [`crate::LightSampler::pace`]. Where much is learned the variance of later frames has been measured to fall about with the root
+    /// of their number, so weights grow like that.
+    pub(crate) fn pace(&self) -> Pace {
+        let first = FIRST_WEIGHTS.get(self.frame as usize);
+        let epochs = self.epoch_end() as f32 / (2 * SINGLE_FRAMES) as f32;
+        Pace {
+            frame_weight: first.copied().unwrap_or(epochs.sqrt()),
+            lessons: self.lessons,
+        }
     }
 
     /// Number of the first frame after this epoch.
@@ -61,36 +68,34 @@ impl Schedule {
         }
     }
 
-    /// Whether the frame that is being rendered will be learned from.
-    #[inline]
-    pub(crate) fn wants_observations(&self) -> bool {
-        self.epoch_end() - self.frame <= LESSON_FRAMES
+    /// Number of frames of this epoch.
+    fn epoch_length(&self) -> u32 {
+        match self.epoch_end() {
+            ..=SINGLE_FRAMES => 1,
+            // As many as all before.
+            u32::MAX => 1 << 31,
+            end => end / 2,
+        }
     }
 
-    /// Ends a frame; at the end of an epoch, returns what is to be learned: the observations of its last frames, of each every nth, so
-    /// that at most [`MAX_OBSERVATIONS`] or so are left. Which ones changes with the frame.
+    /// Ends a frame; at the end of an epoch, returns what is to be learned.
     pub(crate) fn end_frame<'l>(&mut self, logs: &'l [Vec<Observation>]) -> Option<Cow<'l, [Vec<Observation>]>> {
-        let (wanted, end) = (self.wants_observations(), self.epoch_end());
-        // An epoch without end, after more frames than anyone waits for.
-        self.frame = (self.frame + 1).min(u32::MAX - LESSON_FRAMES - 1);
-        if !wanted {
-            return None;
-        }
+        let (end, length) = (self.epoch_end(), self.epoch_length());
         let count = logs.iter().map(Vec::len).sum::<usize>();
-        let step = count.div_ceil(MAX_OBSERVATIONS).max(1);
-        let first = self.frame as usize % step;
-        let thinned = logs
-            .iter()
-            .map(|log| log.iter().skip(first).step_by(step).copied().collect());
+        let weight = (length / LESSON_FRAMES).max(1) * count.div_ceil(MAX_OBSERVATIONS).max(1) as u32;
+        let frame = self.frame;
+        // An epoch without end, after more frames than anyone waits for.
+        self.frame = (self.frame + 1).min(u32::MAX - 2);
+        if weight == 1 && length == 1 {
+            self.lessons = self.lessons.wrapping_add(1);
+            return Some(Cow::Borrowed(logs));
+        }
+        self.kept
+            .extend((0..).zip(logs).map(|(tile, log)| thinned(log, weight, [frame, tile])));
         if self.frame < end {
-            self.kept.extend(thinned);
             return None;
         }
         self.lessons = self.lessons.wrapping_add(1);
-        if step == 1 && self.kept.is_empty() {
-            return Some(Cow::Borrowed(logs));
-        }
-        self.kept.extend(thinned);
         Some(Cow::Owned(std::mem::take(&mut self.kept)))
     }
 
@@ -100,14 +105,35 @@ impl Schedule {
     }
 }
 
+/// The surprising observations of a tile, and one in `weight` of the others, which then stands for that many. `salt`: which are
+/// chosen depends on it.
+fn thinned(log: &[Observation], weight: u32, salt: [u32; 2]) -> Vec<Observation> {
+    if weight == 1 {
+        return log.to_vec();
+    }
+    let added = |o: &Observation| if o.visible { o.unshadowed / o.pmf } else { 0.0 };
+    let mean = log.iter().map(added).sum::<f32>() / log.len().max(1) as f32;
+    let surprising = mean * SURPRISE.max(SURPRISE_PER_WEIGHT * weight as f32);
+    let chosen = u32::MAX / weight;
+    let of = |(index, o): (u32, &Observation)| {
+        if added(o) > surprising {
+            Some(*o)
+        } else {
+            (hash3(salt[0], salt[1], index) <= chosen).then_some(Observation { weight, ..*o })
+        }
+    };
+    (0..).zip(log).filter_map(of).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::ShadingPoint;
     use glam::Vec3;
 
+    /// What a tile reports of which one sample in a hundred adds fifty times what the others do.
     fn log(count: u32) -> Vec<Observation> {
-        let observation = |light| Observation {
+        let observation = |light: u32| Observation {
             point: ShadingPoint {
                 position_ws: Vec3::ZERO,
                 normal_ws: Vec3::Y,
@@ -116,36 +142,50 @@ mod tests {
             light,
             unshadowed: 1.0,
             irradiance: 1.0,
-            pmf: 1.0,
+            pmf: if light % 100 == 7 { 0.02 } else { 1.0 },
             visible: true,
+            weight: 1,
         };
         (0..count).map(observation).collect()
     }
 
     #[test]
-    fn every_first_frame_teaches_then_the_last_of_each_epoch() {
+    fn every_first_frame_teaches_then_each_epoch() {
         let mut schedule = Schedule::default();
         let logs = [log(3)];
         for _ in 0..2 {
-            let before = schedule.lessons();
+            let before = schedule.pace().lessons;
             let mut learned_at = Vec::new();
-            let mut wanted = 0;
             for frame in 1..=130 {
-                wanted += u32::from(schedule.wants_observations());
                 if let Some(lesson) = schedule.end_frame(&logs) {
                     learned_at.push(frame);
-                    let observations = lesson.iter().map(Vec::len).sum::<usize>();
-                    // Epochs are half as long as what is done when they end.
-                    let frames = if frame <= SINGLE_FRAMES { 1 } else { frame / 2 };
-                    assert_eq!(observations, 3 * frames.min(LESSON_FRAMES) as usize);
+                    if frame <= 2 * LESSON_FRAMES {
+                        let length = if frame <= SINGLE_FRAMES { 1 } else { frame as usize / 2 };
+                        assert_eq!(lesson.iter().map(Vec::len).sum::<usize>(), 3 * length);
+                    }
                 }
             }
             let expected: Vec<u32> = (1..=SINGLE_FRAMES).chain([8, 16, 32, 64, 128]).collect();
             assert_eq!(learned_at, expected);
-            assert_eq!(wanted, 8 + 4 * LESSON_FRAMES);
-            assert_eq!(schedule.lessons() - before, expected.len() as u32);
+            assert_eq!(schedule.pace().lessons - before, expected.len() as u32);
             schedule.restart();
         }
+    }
+
+    #[test]
+    fn frames_weigh_more_as_epochs_pass() {
+        let mut schedule = Schedule::default();
+        let mut weights = Vec::new();
+        for _ in 0..17 {
+            weights.push(schedule.pace().frame_weight);
+            schedule.end_frame(&[]);
+        }
+        assert!(weights.is_sorted());
+        assert_eq!([weights[3], weights[4], weights[7]], [0.625, 1.0, 1.0]);
+        assert_eq!(
+            [weights[8], weights[15], weights[16]],
+            [2.0_f32.sqrt(), 2.0_f32.sqrt(), 2.0]
+        );
     }
 
     #[test]
@@ -156,19 +196,38 @@ mod tests {
         };
         for _ in 0..40 {
             assert!(schedule.end_frame(&[log(1)]).is_none());
+            assert!(schedule.pace().frame_weight < 1e5);
         }
     }
 
+    /// Of 16,000 observations one in 16: 7 standard deviations.
     #[test]
-    fn large_logs_are_thinned_to_other_observations_every_frame() {
+    fn what_is_kept_stands_for_all_and_holds_every_surprise() {
+        let all = log(16_000);
+        let mut kept = std::collections::HashSet::new();
+        for frame in 0..4 {
+            let thinned = thinned(&all, 16, [frame, 3]);
+            let surprises = thinned.iter().filter(|o| o.pmf < 1.0);
+            assert!(surprises.clone().all(|o| o.weight == 1));
+            assert_eq!(surprises.count(), 160);
+            let total = thinned.iter().map(|o| o.weight).sum::<u32>();
+            assert!(total.abs_diff(16_000) < 16 * 7 * 31, "{total}");
+            kept.extend(thinned.iter().filter(|o| o.weight == 16).map(|o| o.light));
+        }
+        assert!(kept.len() > 3 * 990 * 9 / 10, "other ones in every frame");
+        // Far fewer, when each stands for very many.
+        assert!(thinned(&all, 1 << 12, [0, 0]).len() < 20);
+    }
+
+    #[test]
+    fn large_images_teach_no_more_than_small_ones() {
         let logs: Vec<_> = (0..4).map(|_| log(MAX_OBSERVATIONS as u32)).collect();
         let mut schedule = Schedule::default();
-        let mut seen = std::collections::HashSet::new();
-        for _ in 0..4 {
-            let thinned = schedule.end_frame(&logs).expect("first frames are learned from");
-            assert_eq!(thinned.iter().map(Vec::len).sum::<usize>(), MAX_OBSERVATIONS);
-            seen.extend(thinned[0].iter().map(|observation| observation.light));
-        }
-        assert_eq!(seen.len(), MAX_OBSERVATIONS);
+        let lesson = schedule.end_frame(&logs).expect("first frames are learned from");
+        let ordinary = lesson.iter().flatten().filter(|o| o.weight > 1).count();
+        assert!(
+            ordinary.abs_diff(MAX_OBSERVATIONS) < MAX_OBSERVATIONS / 20,
+            "{ordinary}"
+        );
     }
 }

@@ -11,7 +11,7 @@
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;
 use crate::schedule::Schedule;
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, records};
+use crate::{Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint, records};
 use glam::Vec3;
 use sampling::Discrete;
 use scene::{Light, Scene};
@@ -23,8 +23,6 @@ const MAX_PRIOR_SAMPLES: f64 = 4.0;
 /// Share of the running maximum in a light's weight. Higher values follow a light that has just turned up sooner, and let a
 /// few strong samples own the table: on a building of 2,000 lights 0.1 costs twice the error of 0.
 const MAX_SHARE: f64 = 0.01;
-/// Contributions above this many times the light's weight count as that many: one spike must not own the table.
-const SPIKE: f64 = 64.0;
 /// Samples of one light after which its older half is forgotten, so that the table follows changes.
 const MEMORY: f64 = 65_536.0;
 /// Lights that are ignored (if that is asked for) have been sampled this often.
@@ -61,8 +59,6 @@ struct Entry {
     sum_sq: f64,
     /// Running maximum at the time of `frame`.
     max: f32,
-    /// Largest contribution that counts in full.
-    spike: f32,
     frame: u32,
 }
 
@@ -154,12 +150,8 @@ fn decayed(max: f32, decay: f32, frames: u32) -> f32 {
 
 impl Table {
     fn new(prior: &[f64], floor: f64) -> Self {
-        let entry = Entry {
-            spike: f32::INFINITY,
-            ..Entry::default()
-        };
         Self {
-            entries: vec![entry; prior.len()],
+            entries: vec![Entry::default(); prior.len()],
             distribution: Discrete::new(prior, floor),
             weights: Vec::new(),
             fresh: 0,
@@ -169,13 +161,15 @@ impl Table {
     fn observe(&mut self, observation: &Observation, brightness: f32, frame: u32, decay: f32) {
         self.fresh += 1;
         let entry = &mut self.entries[observation.light as usize];
-        entry.samples += 1.0;
+        entry.samples += f64::from(observation.weight);
         if !observation.visible {
             return;
         }
-        let contribution = (observation.unshadowed / brightness.max(f32::MIN_POSITIVE)).min(entry.spike);
-        entry.sum_sq += f64::from(contribution) * f64::from(contribution);
-        entry.sightings = entry.sightings.saturating_add(1);
+        // Its share of the light there: no more than all of it, however dark the surroundings.
+        let light = observation.unshadowed;
+        let contribution = light / brightness.max(light).max(f32::MIN_POSITIVE);
+        entry.sum_sq += f64::from(observation.weight) * f64::from(contribution) * f64::from(contribution);
+        entry.sightings = entry.sightings.saturating_add(observation.weight);
         if entry.frame != frame {
             entry.max = decayed(entry.max, decay, frame - entry.frame);
             entry.frame = frame;
@@ -213,7 +207,6 @@ impl Table {
             let mean_sq = (entry.sum_sq + prior_samples * expected_sq) * alive / (entry.samples + prior_samples);
             let max = MAX_SHARE * f64::from(decayed(entry.max, settings.table_decay, frame - entry.frame));
             let weight = (mean_sq + max * max).sqrt();
-            entry.spike = (SPIKE * weight.max(expected_sq.sqrt())) as f32;
             self.weights.push(weight);
         }
         let floor = f64::from(settings.min_probability_mass);
@@ -304,21 +297,13 @@ impl LightSampler for TableSampler {
         local.map_or(0.0, |distribution| distribution.pmf(light))
     }
 
-    fn wants_observations(&self) -> bool {
-        self.schedule.wants_observations()
-    }
-
     /// What was learned may be wrong, and is learned again in a few frames.
     fn scene_changed(&mut self, scene: &Scene) {
         *self = Self::with_caution(&scene.lights, scene.radius, &self.settings, self.cautious);
     }
 
-    fn frame_weight(&self) -> f32 {
-        self.schedule.frame_weight()
-    }
-
-    fn lessons(&self) -> u32 {
-        self.schedule.lessons()
+    fn pace(&self) -> Pace {
+        self.schedule.pace()
     }
 
     fn set_eye(&mut self, _eye_ws: Vec3) {

@@ -214,6 +214,7 @@ pub(crate) fn observe<S: LightSampler>(
                 irradiance: unshadowed,
                 pmf: choice.pmf,
                 visible: visible(choice.light),
+                weight: 1,
             });
         }
     }

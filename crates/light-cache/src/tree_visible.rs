@@ -13,7 +13,7 @@ mod visibility;
 use crate::records;
 use crate::schedule::Schedule;
 use crate::tree::{Descent, Floor, Tree, position, probability};
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint};
+use crate::{Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint};
 use glam::Vec3;
 use scene::{Light, Scene};
 use std::time::Instant;
@@ -149,21 +149,13 @@ impl LightSampler for TreeVisibleSampler {
         }
     }
 
-    fn wants_observations(&self) -> bool {
-        self.schedule.wants_observations()
-    }
-
     /// What was learned may be wrong, and is learned again in a few frames.
     fn scene_changed(&mut self, scene: &Scene) {
         *self = Self::with_caution(&scene.lights, &self.settings, false);
     }
 
-    fn frame_weight(&self) -> f32 {
-        self.schedule.frame_weight()
-    }
-
-    fn lessons(&self) -> u32 {
-        self.schedule.lessons()
+    fn pace(&self) -> Pace {
+        self.schedule.pace()
     }
 
     fn set_eye(&mut self, _eye_ws: Vec3) {

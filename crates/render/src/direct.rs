@@ -3,7 +3,7 @@
 use crate::path::{Probe, TileLog};
 use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
-use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
 use sampling::{VertexSequence, mis, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 
@@ -73,14 +73,9 @@ pub(crate) trait DirectLight: Sync + Send {
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
 
-    /// How often what is drawn has changed, see [`LightSampler::lessons`].
-    fn lessons(&self) -> u32 {
-        0
-    }
-
-    /// Weight of the next frame's samples, see [`LightSampler::frame_weight`].
-    fn frame_weight(&self) -> f32 {
-        1.0
+    /// See [`LightSampler::pace`].
+    fn pace(&self) -> Pace {
+        Pace::STEADY
     }
 
     /// Tells where the eye is.
@@ -156,7 +151,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
             let visible = connection
                 .as_ref()
                 .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
-            if S::LEARNS && self.0.wants_observations() {
+            if S::LEARNS {
                 log.observations.push(Observation {
                     point: vertex.point,
                     light: choice.light,
@@ -164,6 +159,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
                     irradiance: connection.as_ref().map_or(0.0, |c| c.irradiance),
                     pmf: choice.pmf,
                     visible,
+                    weight: 1,
                 });
             }
             if let Some(connection) = connection
@@ -183,12 +179,8 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         self.0.pmf(local, light)
     }
 
-    fn lessons(&self) -> u32 {
-        self.0.lessons()
-    }
-
-    fn frame_weight(&self) -> f32 {
-        self.0.frame_weight()
+    fn pace(&self) -> Pace {
+        self.0.pace()
     }
 
     fn set_eye(&mut self, eye_ws: Vec3) {

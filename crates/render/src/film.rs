@@ -208,7 +208,7 @@ impl Film {
         self.tiles.len()
     }
 
-    /// From now on samples are added with this weight, above 0 and at most 1. Weights must not depend on the samples that
+    /// From now on samples are added with this weight, above 0. Weights must not depend on the samples that
     /// they weigh, or the mean is biased.
     pub(crate) fn set_weight(&mut self, weight: f32) {
         self.tiles.iter_mut().for_each(|tile| tile.weight = weight);

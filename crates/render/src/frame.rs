@@ -225,7 +225,8 @@ impl<D: DirectLight> Frames for Drawn<D> {
     /// nothing and their number changes nothing.
     fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
         let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
-        film.set_weight(self.direct.frame_weight());
+        let pace = self.direct.pace();
+        film.set_weight(pace.frame_weight);
         let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
         let counters = tiles.map(|(tile, observations)| {
             observations.clear();
@@ -237,9 +238,8 @@ impl<D: DirectLight> Frames for Drawn<D> {
             log.counters
         });
         let counters = counters.reduce(Counters::default, Counters::add);
-        let lessons = self.direct.lessons();
         self.direct.end_frame(eye.scene, &self.observations);
-        if self.direct.lessons() != lessons {
+        if self.direct.pace().lessons != pace.lessons {
             // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
             self.first_frame = eye.frame.wrapping_add(1);
         }

@@ -78,13 +78,13 @@ impl Entry {
         Emitter::of(tree, self.branch).with_strength(self.believed * self.ratio())
     }
 
-    /// Takes note of a ratio. `most`: what no light can exceed by much.
-    fn observe(&mut self, ratio: f32, visible: bool, most: f32) {
+    /// Takes note of a ratio, `times` times. `most`: what no light can exceed by much.
+    fn observe(&mut self, ratio: f32, visible: bool, most: f32, times: f32) {
         let expected = self.prior.max((self.sum_sq / self.drawn.max(1.0)).sqrt());
-        self.drawn += 1.0;
+        self.drawn += times;
         if visible {
-            self.visible += 1.0;
-            self.sum_sq += ratio.min((SPIKE * expected).max(most)).powi(2);
+            self.visible += times;
+            self.sum_sq += times * ratio.min((SPIKE * expected).max(most)).powi(2);
         }
     }
 }
@@ -225,6 +225,7 @@ impl Cell {
         observations: impl Iterator<Item = &'o (&'o Observation, Cube)>,
     ) {
         for &(o, cube) in observations {
+            let times = o.weight as f32;
             let place = tree.rank[o.light as usize];
             let j = self.entry_of(place);
             let receiver = Receiver::from(&o.point);
@@ -235,10 +236,11 @@ impl Cell {
             let estimate = self.entries[j].emitter(tree).importance::<true>(&receiver);
             if within > 0.0 && estimate > 0.0 {
                 let ratio = o.irradiance / (within * unit * estimate);
-                self.entries[j].observe(ratio, o.visible, self.total / estimate);
-                self.subcells.observe(cube, j, o.visible, self.entries.len(), may_grow);
+                self.entries[j].observe(ratio, o.visible, self.total / estimate, times);
+                self.subcells
+                    .observe(cube, j, Count::of(o), self.entries.len(), may_grow);
             }
-            self.seen += 1.0;
+            self.seen += times;
         }
         if self.seen >= 2.0 * self.refined_at.max(8.0) {
             let old: Vec<Branch> = self.branches().collect();

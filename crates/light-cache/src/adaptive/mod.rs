@@ -22,8 +22,8 @@ mod weights;
 use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
-    CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint, TableSampler,
-    TreeVisibleSampler, records,
+    CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint,
+    TableSampler, TreeVisibleSampler, records,
 };
 use cell::Nearby;
 use cells::Cells;
@@ -119,17 +119,8 @@ impl LightSampler for AdaptiveSampler {
     type Local<'a> = Local<'a>;
     const LEARNS: bool = true;
 
-    #[inline]
-    fn wants_observations(&self) -> bool {
-        self.schedule.wants_observations()
-    }
-
-    fn frame_weight(&self) -> f32 {
-        self.schedule.frame_weight()
-    }
-
-    fn lessons(&self) -> u32 {
-        self.schedule.lessons()
+    fn pace(&self) -> Pace {
+        self.schedule.pace()
     }
 
     /// What was learned may be wrong anywhere, and is learned again in a few frames.

@@ -6,6 +6,7 @@
 
 use super::branch::Branch;
 use super::weights::{LANES, Lanes};
+use crate::Observation;
 use crate::tree::Tree;
 
 /// Cubes of each layer along an edge of the cell: 2 to this power. Higher values follow finer shadows; lower values learn faster.
@@ -50,6 +51,13 @@ pub(super) struct Count {
 }
 
 impl Count {
+    /// What one observation says.
+    pub(super) fn of(observation: &Observation) -> Self {
+        let drawn = observation.weight as f32;
+        let visible = if observation.visible { drawn } else { 0.0 };
+        Self { drawn, visible }
+    }
+
     /// Visible share, given what is expected.
     fn share(self, expected: f32) -> f32 {
         let n = self.drawn + PRIOR_COUNT;
@@ -73,12 +81,12 @@ struct SubCell {
 }
 
 impl SubCell {
-    /// Takes note of a draw of an entry.
-    fn observe(&mut self, entry: usize, visible: bool) {
+    /// Takes note of draws of an entry.
+    fn observe(&mut self, entry: usize, draws: Count) {
         let count = &mut self.counts[entry];
-        count.drawn += 1.0;
-        count.visible += f32::from(u8::from(visible));
-        self.seen += 1.0;
+        count.drawn += draws.drawn;
+        count.visible += draws.visible;
+        self.seen += draws.drawn;
     }
 
     /// Makes the factors. `whole`: what the whole cell has seen of each entry; `around`: the factors of the cube around this one, empty
@@ -144,8 +152,8 @@ impl SubCells {
         &[]
     }
 
-    /// Takes note of a draw of an entry, one of `entries`. Cubes are made where they are missing, if they `may_grow` in number.
-    pub(super) fn observe(&mut self, cube: Cube, entry: usize, visible: bool, entries: usize, may_grow: bool) {
+    /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing, if they `may_grow` in number.
+    pub(super) fn observe(&mut self, cube: Cube, entry: usize, draws: Count, entries: usize, may_grow: bool) {
         let mut around = NONE;
         for (layer, bits) in self.layers.iter_mut().zip(LAYERS) {
             let number = &mut layer.numbers[cube.within(bits)];
@@ -163,7 +171,7 @@ impl SubCells {
                 });
             }
             around = *number;
-            layer.subcells[usize::from(around)].observe(entry, visible);
+            layer.subcells[usize::from(around)].observe(entry, draws);
         }
     }
 
@@ -250,9 +258,13 @@ mod tests {
     fn cubes_are_told_apart_and_believe_what_is_around_them() {
         let mut subcells = SubCells::new();
         let (lit, dark) = (Cube::at([0, 3, 12]), Cube::at([-1, 3, 12]));
-        for (cube, visible) in [(lit, true), (dark, false)] {
-            for _ in 0..100 {
-                subcells.observe(cube, 17, visible, 20, true);
+        for (cube, visible) in [(lit, 1.0), (dark, 0.0)] {
+            for _ in 0..50 {
+                let draws = Count {
+                    drawn: 2.0,
+                    visible: 2.0 * visible,
+                };
+                subcells.observe(cube, 17, draws, 20, true);
             }
         }
         subcells.refresh(&whole(20), false);
@@ -276,7 +288,11 @@ mod tests {
         fine.extend(&coarse[1..]);
         let mut subcells = SubCells::new();
         for entry in [0, 0, 1] {
-            subcells.observe(Cube::at([1, 2, 3]), entry, true, 3, true);
+            let draw = Count {
+                drawn: 1.0,
+                visible: 1.0,
+            };
+            subcells.observe(Cube::at([1, 2, 3]), entry, draw, 3, true);
         }
         let drawn = |subcells: &SubCells| {
             let of = |layer: &Layer| layer.subcells[0].counts.iter().map(|c| c.drawn).collect::<Vec<_>>();

@@ -102,27 +102,30 @@ impl Visibility {
     /// Takes note of a shadow ray towards the light at `place` in tree order.
     pub(super) fn observe(&mut self, place: u32, observation: &Observation) {
         let seen = &mut self.seen[place as usize];
-        seen.rays += 1;
-        seen.arrived += u32::from(observation.visible);
+        let times = observation.weight;
+        seen.rays = seen.rays.saturating_add(times);
+        if observation.visible {
+            seen.arrived = seen.arrived.saturating_add(times);
+        }
         if seen.evidence.samples > MEMORY {
             seen.evidence = seen.evidence.at_most(0.5 * MEMORY);
         }
-        let weight = if seen.mean > 0.0 {
+        let energy = if seen.mean > 0.0 {
             (observation.unshadowed / seen.mean).min(SPIKE)
         } else {
             1.0
         };
         // The mean itself is robust too: spikes count as SPIKE times what it was.
-        let rate = 1.0 / (seen.rays.min(1024) as f32);
+        let rate = (times as f32 / seen.rays.min(1024) as f32).min(1.0);
         let clamped = if seen.mean > 0.0 {
             observation.unshadowed.min(SPIKE * seen.mean)
         } else {
             observation.unshadowed
         };
         seen.mean += (clamped - seen.mean) * rate;
-        seen.evidence.samples += weight;
+        seen.evidence.samples += times as f32 * energy;
         if observation.visible {
-            seen.evidence.visible += weight;
+            seen.evidence.visible += times as f32 * energy;
         }
     }
 
