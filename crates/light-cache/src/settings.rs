@@ -54,8 +54,8 @@ pub struct Settings {
     /// Total probability mass shared equally by all lights whatever was learned, in \[0, 1\]. Higher values find
     /// overlooked lights sooner and bound the noise they make; lower values waste fewer samples. 0.005.
     pub min_probability_mass: f32,
-    /// Factor by which the table's running maximum shrinks every frame, in (0, 1\]. Higher values remember longer;
-    /// lower values follow changes sooner. 0.9.
+    /// Factor by which the table's running maximum shrinks with every lesson (after each of the first frames, then after
+    /// 8, 16, 32, ... frames), in (0, 1\]. Higher values remember longer; lower values follow changes sooner. 0.9.
     pub table_decay: f32,
     /// Biased, off at 0: lights whose table entry is below this share of the mean are ignored. Higher values drop more.
     pub ignore_below: f32,

@@ -1,12 +1,12 @@
 //! The global running importance table (Wald, Benthin and Slusallek 2003, "Interactive Global Illumination in Complex and Highly Occluded Environments").
 //!
 //! Eye paths report what each light contributes to the pixels, in units of the brightness around the point (errors are
-//! judged by that). Per light the table keeps the running maximum, decayed every frame, and the second moment: the least
+//! judged by that). Per light the table keeps the running maximum, decayed with every lesson, and the second moment: the least
 //! noisy distribution is proportional to its root (Rath et al. 2020, "Variance-Aware Path Guiding"). A light is drawn
 //! in proportion to that root, lifted by a share of the maximum so that a light that has just turned up is not forgotten
 //! again at once. Lights without samples are believed to be worth their power, and lights that were sampled and not seen
 //! as much less as the lights seen just once say (Good 1953, "The population frequencies of species and the estimation
-//! of population parameters"). Differs from Wald et al.: no separate estimation pass, every frame teaches the next.
+//! of population parameters"). Differs from Wald et al.: no separate estimation pass, frames teach those after them.
 
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;

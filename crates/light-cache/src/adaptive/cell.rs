@@ -8,14 +8,14 @@
 use super::branch::Branch;
 use super::emitter::Emitter;
 use super::subcells::{Count, Cube, SubCells};
-use super::weights::{Lanes, Part, Wanted, Weights};
+use super::weights::{Lanes, Part, View, Wanted, Weights};
 use crate::Observation;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 
 /// Most entries of a cut. Higher values resolve more lights one by one; lower values learn faster and cost less.
-pub(super) const MAX_ENTRIES: usize = 128;
+pub(super) const MAX_ENTRIES: usize = 96;
 /// Entries of a new cell's cut.
-const FIRST_ENTRIES: usize = 96;
+const FIRST_ENTRIES: usize = 72;
 /// How many observations the prior is worth.
 const PRIOR_COUNT: f32 = 2.0;
 /// Part of the prior that does not fade with what was learned. Higher values waste samples on hidden lights; lower values
@@ -365,9 +365,12 @@ impl Nearby<'_> {
     /// The same for several positions.
     #[inline]
     pub(super) fn draw_each(&self, receiver: &Receiver, wanted: &[Wanted], width: u64, parts: &mut [Option<Part>]) {
-        self.cell
-            .weights
-            .find_each(receiver, self.factors, wanted, width, parts);
+        let view = View {
+            receiver,
+            factors: self.factors,
+            width,
+        };
+        self.cell.weights.find_each(&view, wanted, parts);
     }
 
     /// The entry that holds the light at `position` in tree order, and its part of the interval.

@@ -4,7 +4,7 @@
 //! contribute, visibility included, to what they are estimated to send. A light is drawn in two steps: an entry by the weights of all
 //! entries at the point, then, where the entry is a cluster, a light of it by the tree's descent at the point itself. A fixed share of the
 //! random numbers goes to the global importance table, which holds the guaranteed minimum of every light and every light that ever mattered
-//! anywhere in the image.
+//! anywhere in the image. Where shadows are finer than a cell, cubes within it count the visible share of each entry.
 //!
 //! Related: Pantaleoni 2019 (Importance sampling of many lights with reinforcement lightcuts learning), Wang et al. 2021 (Learning to cluster for rendering with many
 //! lights), Vevoda et al. 2018 (Bayesian online regression for adaptive direct illumination sampling). Differs: what is learned are ratios of second moments to an

@@ -52,6 +52,17 @@ pub(super) struct Weights {
     attenuation: Vec<Attenuation>,
 }
 
+/// A cut as it is seen from a point: an interval cut in proportion to the weights there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View<'v> {
+    /// The point.
+    pub(super) receiver: &'v Receiver,
+    /// By which the weights are multiplied; empty for 1.
+    pub(super) factors: &'v [Lanes],
+    /// Of the interval, at most 2^52.
+    pub(super) width: u64,
+}
+
 /// What to look for in an interval.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Wanted {
@@ -133,84 +144,48 @@ impl Weights {
         self.rows.capacity() * size_of::<Row>() + self.attenuation.capacity() * size_of::<Attenuation>()
     }
 
-    /// For each of `wanted` the part that holds it, of an interval of `width`, which is at most 2^52, cut in proportion to the
-    /// weights at a point times `factors` (empty for 1); `None` if all are zero. The weights are worked out once.
+    /// For each of `wanted` the part that holds it; `None` if all weights are zero. The weights are worked out once.
     #[cfg(target_arch = "x86_64")]
     #[inline]
     #[allow(unsafe_code, reason = "compiled for instructions that not every processor has")]
-    pub(super) fn find_each(
-        &self,
-        receiver: &Receiver,
-        factors: &[Lanes],
-        wanted: &[Wanted],
-        width: u64,
-        parts: &mut [Option<Part>],
-    ) {
+    pub(super) fn find_each(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
         if is_x86_feature_detected!("avx512f")
             && is_x86_feature_detected!("avx512vl")
             && is_x86_feature_detected!("avx512dq")
         {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx512(receiver, factors, wanted, width, parts) }
+            unsafe { self.find_avx512(view, wanted, parts) }
         } else if is_x86_feature_detected!("avx2") {
             // SAFETY: the processor has the instructions.
-            unsafe { self.find_avx2(receiver, factors, wanted, width, parts) }
+            unsafe { self.find_avx2(view, wanted, parts) }
         } else {
-            self.find_anywhere(receiver, factors, wanted, width, parts);
+            self.find_anywhere(view, wanted, parts);
         }
     }
 
     /// The same on other processors.
     #[cfg(not(target_arch = "x86_64"))]
     #[inline]
-    pub(super) fn find_each(
-        &self,
-        receiver: &Receiver,
-        factors: &[Lanes],
-        wanted: &[Wanted],
-        width: u64,
-        parts: &mut [Option<Part>],
-    ) {
-        self.find_anywhere(receiver, factors, wanted, width, parts);
+    pub(super) fn find_each(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
+        self.find_anywhere(view, wanted, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx512f,avx512vl,avx512dq")]
-    fn find_avx512(
-        &self,
-        receiver: &Receiver,
-        factors: &[Lanes],
-        wanted: &[Wanted],
-        width: u64,
-        parts: &mut [Option<Part>],
-    ) {
-        self.find_anywhere(receiver, factors, wanted, width, parts);
+    fn find_avx512(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
+        self.find_anywhere(view, wanted, parts);
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    fn find_avx2(
-        &self,
-        receiver: &Receiver,
-        factors: &[Lanes],
-        wanted: &[Wanted],
-        width: u64,
-        parts: &mut [Option<Part>],
-    ) {
-        self.find_anywhere(receiver, factors, wanted, width, parts);
+    fn find_avx2(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
+        self.find_anywhere(view, wanted, parts);
     }
 
     #[inline(always)]
-    fn find_anywhere(
-        &self,
-        receiver: &Receiver,
-        factors: &[Lanes],
-        wanted: &[Wanted],
-        width: u64,
-        parts: &mut [Option<Part>],
-    ) {
-        let (weights, lanes) = self.evaluate(receiver, factors);
-        let Some(cut) = Cut::new(&lanes, width) else {
+    fn find_anywhere(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
+        let (weights, lanes) = self.evaluate(view.receiver, view.factors);
+        let Some(cut) = Cut::new(&lanes, view.width) else {
             parts.fill(None);
             return;
         };
@@ -247,28 +222,24 @@ impl Weights {
         let mut all = [[0.0; LANES]; MAX_ROWS];
         let mut lanes = [0.0; LANES];
         for (index, (row, weights)) in self.rows.iter().zip(&mut all).enumerate() {
+            let factors = factors.get(index).unwrap_or(&[1.0; LANES]);
+            // One loop over the lanes, so that a row stays in registers until it is done.
             if let Some(attenuation) = self.attenuation.get(index) {
-                for (lane, weight) in weights.iter_mut().enumerate() {
+                for lane in 0..LANES {
                     let emitter = Emitter {
                         cone_scale: attenuation.cone_scale[lane],
                         cone_offset: attenuation.cone_offset[lane],
                         inverse_range_sq: attenuation.inverse_range_sq[lane],
                         ..row.emitter(lane)
                     };
-                    *weight = emitter.importance::<true>(receiver);
+                    weights[lane] = emitter.importance::<true>(receiver) * factors[lane];
+                    lanes[lane] += weights[lane];
                 }
             } else {
-                for (lane, weight) in weights.iter_mut().enumerate() {
-                    *weight = row.emitter(lane).importance::<false>(receiver);
+                for lane in 0..LANES {
+                    weights[lane] = row.emitter(lane).importance::<false>(receiver) * factors[lane];
+                    lanes[lane] += weights[lane];
                 }
-            }
-            if let Some(factors) = factors.get(index) {
-                for (weight, factor) in weights.iter_mut().zip(factors) {
-                    *weight *= factor;
-                }
-            }
-            for (sum, weight) in lanes.iter_mut().zip(weights) {
-                *sum += *weight;
             }
         }
         (all, lanes)
@@ -406,22 +377,26 @@ mod tests {
             .collect();
         for (i, point) in (0..).zip(points(200, 5)) {
             let receiver = Receiver::from(&point);
-            let factors = if i % 2 == 0 { &[][..] } else { &dimmed };
+            let view = View {
+                receiver: &receiver,
+                factors: if i % 2 == 0 { &[] } else { &dimmed },
+                width: WIDTH,
+            };
             let x = sampling::Random::new(1, i, 0).u32(0);
             for wanted in [
                 Wanted::At(u64::from(x) << 19),
                 Wanted::Entry(x as usize % entries.len()),
             ] {
                 let mut portable = [None];
-                weights.find_anywhere(&receiver, factors, &[wanted], WIDTH, &mut portable);
+                weights.find_anywhere(&view, &[wanted], &mut portable);
                 let mut fastest = [None];
-                weights.find_each(&receiver, factors, &[wanted], WIDTH, &mut fastest);
+                weights.find_each(&view, &[wanted], &mut fastest);
                 assert_eq!(fastest, portable);
             }
             let mut end = 0;
             for entry in 0..entries.len() {
                 let mut part = [None];
-                weights.find_each(&receiver, factors, &[Wanted::Entry(entry)], WIDTH, &mut part);
+                weights.find_each(&view, &[Wanted::Entry(entry)], &mut part);
                 let [Some(part)] = part else {
                     end = WIDTH; // nothing arrives here
                     break;
