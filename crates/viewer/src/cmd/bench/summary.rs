@@ -40,7 +40,7 @@ pub(super) struct SamplerResult {
     pub(super) sampler: &'static str,
     /// Number of runs.
     pub(super) seeds: usize,
-    /// Frames of all runs.
+    /// Frames of a run, median.
     pub(super) frames: usize,
     /// Median frame time, milliseconds, learning included.
     pub(super) frame_ms_median: f64,
@@ -182,7 +182,7 @@ impl SamplerResult {
         Self {
             sampler: method.name(),
             seeds: runs.len(),
-            frames: frame_ms.len(),
+            frames: median(runs.iter().map(|run| run.frames.len() as f64).collect()).unwrap_or(0.0) as usize,
             frame_ms_median: quantile(&frame_ms, 0.5),
             frame_ms_p95: quantile(&frame_ms, 0.95),
             frame_ms_p99: quantile(&frame_ms, 0.99),
