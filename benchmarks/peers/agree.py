@@ -30,10 +30,7 @@ def run(*command):
 
 
 def ours(args, glb, seed, out):
-    # the peers' reader keeps the last camera of a file
-    size = int.from_bytes(glb.read_bytes()[12:16], "little")
-    camera = len(json.loads(glb.read_bytes()[20:20 + size])["cameras"]) - 1
-    run(args.manylight, "render", glb, "-o", out, "--spp", args.spp, "--seed", seed, "--sampler", args.sampler, "--max-bounces", 0, "--camera", camera, "--width", SIZE[0], "--height", SIZE[1])
+    run(args.manylight, "render", glb, "-o", out, "--spp", args.spp, "--seed", seed, "--sampler", args.sampler, "--max-bounces", 0, "--width", SIZE[0], "--height", SIZE[1])
     return np.array(mi.Bitmap(str(out)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
 
 
