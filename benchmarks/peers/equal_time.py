@@ -73,14 +73,14 @@ def mitsuba(args, glb, work):
         told = run(sys.executable, HERE / "mitsuba_run.py", glb, work / "mitsuba.npy", "--spp", spp, "--passes", passes, "--seed", seed, "--size", *SIZE)
         return json.loads(told.splitlines()[-1])
 
-    # The first pass compiles; the other three tell the speed.
-    first = render(LEARN_SPP, 4, 0)
-    pass_s = (first["render_s"] - first["first_pass_s"]) / 3
-    spp = max(1, round(LEARN_SPP * args.seconds / pass_s))
+    # Of two passes the first may compile. A pass costs something whatever its samples, so the speed is measured again at about the number wanted.
+    spp = LEARN_SPP
+    for _ in range(3):
+        measured, seconds = spp, render(spp, 2, 0)["best_pass_s"]
+        spp = max(1, round(spp * args.seconds / seconds))
     for seed in SEEDS:
-        # One pass of all samples: what is compiled before does not count.
         render(spp, 1, 1000 * (seed + 1))
-        yield np.load(work / "mitsuba.npy"), spp, spp * pass_s / LEARN_SPP
+        yield np.load(work / "mitsuba.npy"), spp, seconds * spp / measured
 
 
 def cycles(args, glb, work):
