@@ -3,7 +3,7 @@
 //! Learning changes what is drawn, so it must not know the random numbers that are still to come; but those of one sequence
 //! are anything but independent of each other: each avoids the strata that the ones before it have been in. So frames come in epochs:
 //! within one nothing is learned and the sequence keeps its strata, and after it a new sequence begins
-//! ([`crate::Pace::lessons`]). The first epochs are single frames, later ones double
+//! ([`crate::Pace::lessons`]). The first epochs are single frames, later ones grow by a factor, 2 for samplers that have much to learn
 //! (cf. Mueller, Gross and Novak 2017, "Practical Path Guiding for Efficient Light-Transport Simulation", section 5).
 //!
 //! Long epochs observe more than is worth learning, all but what was not expected: a light that adds much more than its
@@ -12,6 +12,7 @@
 use crate::{Observation, Pace};
 use sampling::hash::hash3;
 use std::borrow::Cow;
+use std::ops::Range;
 
 /// Epochs of one frame each, after the eye has moved; a power of two. Higher values learn sooner; lower values keep more strata.
 const SINGLE_FRAMES: u32 = 4;
@@ -28,9 +29,15 @@ const SURPRISE: f32 = 2.0;
 /// The same per observation that each kept one stands for, where that is more: bounds what is kept.
 const SURPRISE_PER_WEIGHT: f32 = 0.25;
 
+/// Frames after which epochs grow as the sampler wishes; until then they double. A power of two.
+const EARLY_FRAMES: u32 = 16;
+
 /// Where a sampler is in the course of its learning.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Schedule {
+    /// By how much the end of each later epoch is further than that of the one before; a power of two. Higher values keep more strata;
+    /// lower values learn more.
+    growth: u32,
     /// Frames done since the eye has moved.
     frame: u32,
     /// Times that the sampler has learned.
@@ -40,6 +47,17 @@ pub(crate) struct Schedule {
 }
 
 impl Schedule {
+    /// Nothing done yet; `growth`: by how much epochs grow, a power of two.
+    pub(crate) fn new(growth: u32) -> Self {
+        debug_assert!(growth > 1 && growth.is_power_of_two());
+        Self {
+            growth,
+            frame: 0,
+            lessons: 0,
+            kept: Vec::new(),
+        }
+    }
+
     /// The eye has moved: what is seen is new.
     pub(crate) fn restart(&mut self) {
         self.frame = 0;
@@ -50,49 +68,45 @@ impl Schedule {
     /// of their number, so weights grow like that.
     pub(crate) fn pace(&self) -> Pace {
         let first = FIRST_WEIGHTS.get(self.frame as usize);
-        let epochs = self.epoch_end() as f32 / (2 * SINGLE_FRAMES) as f32;
+        let epochs = self.epoch().start as f32 / SINGLE_FRAMES as f32;
         Pace {
             frame_weight: first.copied().unwrap_or(epochs.sqrt()),
             lessons: self.lessons,
         }
     }
 
-    /// Number of the first frame after this epoch.
-    #[inline]
-    fn epoch_end(&self) -> u32 {
-        let next = self.frame + 1;
-        if next <= SINGLE_FRAMES {
-            next
-        } else {
-            next.checked_next_power_of_two().unwrap_or(u32::MAX)
+    /// The frames of this epoch.
+    fn epoch(&self) -> Range<u32> {
+        if self.frame < SINGLE_FRAMES {
+            return self.frame..self.frame + 1;
         }
-    }
-
-    /// Number of frames of this epoch.
-    fn epoch_length(&self) -> u32 {
-        match self.epoch_end() {
-            ..=SINGLE_FRAMES => 1,
-            // As many as all before.
-            u32::MAX => 1 << 31,
-            end => end / 2,
+        let mut start = SINGLE_FRAMES;
+        loop {
+            let growth = if start < EARLY_FRAMES { 2 } else { self.growth };
+            // The last one has no end: after more frames than anyone waits for.
+            let end = start.saturating_mul(growth);
+            if self.frame < end {
+                return start..end;
+            }
+            start = end;
         }
     }
 
     /// Ends a frame; at the end of an epoch, returns what is to be learned.
     pub(crate) fn end_frame<'l>(&mut self, logs: &'l [Vec<Observation>]) -> Option<Cow<'l, [Vec<Observation>]>> {
-        let (end, length) = (self.epoch_end(), self.epoch_length());
+        let epoch = self.epoch();
+        let length = epoch.end - epoch.start;
         let count = logs.iter().map(Vec::len).sum::<usize>();
         let weight = (length / LESSON_FRAMES).max(1) * count.div_ceil(MAX_OBSERVATIONS).max(1) as u32;
         let frame = self.frame;
-        // An epoch without end, after more frames than anyone waits for.
-        self.frame = (self.frame + 1).min(u32::MAX - 2);
+        self.frame = (self.frame + 1).min(u32::MAX - 1);
         if weight == 1 && length == 1 {
             self.lessons = self.lessons.wrapping_add(1);
             return Some(Cow::Borrowed(logs));
         }
         self.kept
             .extend((0..).zip(logs).map(|(tile, log)| thinned(log, weight, [frame, tile])));
-        if self.frame < end {
+        if self.frame < epoch.end {
             return None;
         }
         self.lessons = self.lessons.wrapping_add(1);
@@ -151,7 +165,7 @@ mod tests {
 
     #[test]
     fn every_first_frame_teaches_then_each_epoch() {
-        let mut schedule = Schedule::default();
+        let mut schedule = Schedule::new(2);
         let logs = [log(3)];
         for _ in 0..2 {
             let before = schedule.pace().lessons;
@@ -173,8 +187,21 @@ mod tests {
     }
 
     #[test]
+    fn later_epochs_grow_as_asked() {
+        let mut schedule = Schedule::new(16);
+        let mut learned_at = Vec::new();
+        for frame in 1..=300 {
+            if schedule.end_frame(&[]).is_some() {
+                learned_at.push(frame);
+            }
+        }
+        assert_eq!(learned_at, [1, 2, 3, 4, 8, 16, 256]);
+        assert_eq!(schedule.pace().frame_weight, 8.0);
+    }
+
+    #[test]
     fn frames_weigh_more_as_epochs_pass() {
-        let mut schedule = Schedule::default();
+        let mut schedule = Schedule::new(2);
         let mut weights = Vec::new();
         for _ in 0..17 {
             weights.push(schedule.pace().frame_weight);
@@ -192,7 +219,7 @@ mod tests {
     fn the_last_epoch_never_ends() {
         let mut schedule = Schedule {
             frame: u32::MAX - 20,
-            ..Schedule::default()
+            ..Schedule::new(2)
         };
         for _ in 0..40 {
             assert!(schedule.end_frame(&[log(1)]).is_none());
@@ -222,7 +249,7 @@ mod tests {
     #[test]
     fn large_images_teach_no_more_than_small_ones() {
         let logs: Vec<_> = (0..4).map(|_| log(MAX_OBSERVATIONS as u32)).collect();
-        let mut schedule = Schedule::default();
+        let mut schedule = Schedule::new(2);
         let lesson = schedule.end_frame(&logs).expect("first frames are learned from");
         let ordinary = lesson.iter().flatten().filter(|o| o.weight > 1).count();
         assert!(

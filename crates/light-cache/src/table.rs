@@ -101,7 +101,7 @@ impl TableSampler {
             cells: Vec::new(),
             cautious,
             settings: settings.clone(),
-            schedule: Schedule::default(),
+            schedule: Schedule::new(2),
             frame: 0,
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,

@@ -22,6 +22,12 @@ use visibility::Visibility;
 /// Share by which the observations must have grown before the tree is weighted anew: later frames change little.
 const GROWTH: f64 = 0.02;
 
+/// Observations per light after which the tree is built anew with the lights that have been seen to arrive in a subtree of their own:
+/// building costs much more than weighing. Higher values build less often; lower values profit sooner.
+const OBSERVATIONS_TO_REGROUP: usize = 4;
+/// By how much epochs grow: visible shares of lights are learned in a few frames. See [`Schedule`].
+const EPOCH_GROWTH: u32 = 16;
+
 /// The light tree, leaf flux times learned visibility.
 #[derive(Debug)]
 pub struct TreeVisibleSampler {
@@ -34,6 +40,8 @@ pub struct TreeVisibleSampler {
     /// Observations since the tree was last weighted.
     fresh: usize,
     observations: u64,
+    /// Observations after which the tree is built anew.
+    regroup_at: u64,
     build_s: f64,
     learn_s: f64,
 }
@@ -62,10 +70,11 @@ impl TreeVisibleSampler {
         Self {
             visibility: Visibility::new(&tree, cautious),
             floor: Floor::new(settings.min_probability_mass, lights.len()),
-            schedule: Schedule::default(),
+            schedule: Schedule::new(EPOCH_GROWTH),
             settings: settings.clone(),
             fresh: 0,
             observations: 0,
+            regroup_at: (OBSERVATIONS_TO_REGROUP * tree.len()) as u64,
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
             tree,
@@ -78,22 +87,33 @@ impl TreeVisibleSampler {
         &self.tree
     }
 
-    /// Learns from a frame that is one to learn from.
+    /// Learns from the frames of an epoch.
     pub(crate) fn learn(&mut self, logs: &[Vec<Observation>]) {
         let start = Instant::now();
-        for observation in logs.iter().flatten() {
-            self.visibility
-                .observe(self.tree.rank[observation.light as usize], observation);
-            self.fresh += 1;
-        }
-        // A pass over all lights has to be paid for by a fair number of observations.
-        if self.fresh > 0 && self.fresh >= self.tree.len() / 4 && self.fresh as f64 >= GROWTH * self.observations as f64
-        {
-            self.observations += self.fresh as u64;
-            self.fresh = 0;
+        self.observe(logs);
+        if self.knows_more() {
             self.visibility.apply(&mut self.tree);
         }
         self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    fn observe(&mut self, logs: &[Vec<Observation>]) {
+        for observation in logs.iter().flatten() {
+            let place = self.tree.rank[observation.light as usize];
+            self.visibility.observe(place, observation);
+            self.fresh += 1;
+        }
+    }
+
+    /// Whether the tree should be weighed anew: a pass over all lights has to be paid for by a fair number of observations.
+    fn knows_more(&mut self) -> bool {
+        let many = self.fresh > 0 && self.fresh >= self.tree.len() / 4;
+        let more = many && self.fresh as f64 >= GROWTH * self.observations as f64;
+        if more {
+            self.observations += self.fresh as u64;
+            self.fresh = 0;
+        }
+        more
     }
 
     #[inline]
@@ -162,10 +182,20 @@ impl LightSampler for TreeVisibleSampler {
         self.schedule.restart();
     }
 
-    fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
-        if let Some(logs) = self.schedule.end_frame(logs) {
-            self.learn(&logs);
+    fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
+        let Some(logs) = self.schedule.end_frame(logs) else {
+            return;
+        };
+        let start = Instant::now();
+        self.observe(&logs);
+        if self.knows_more() {
+            if self.observations >= self.regroup_at {
+                self.visibility.regroup(&mut self.tree, &scene.lights);
+                self.regroup_at = self.observations + (OBSERVATIONS_TO_REGROUP * self.tree.len()) as u64;
+            }
+            self.visibility.apply(&mut self.tree);
         }
+        self.learn_s += start.elapsed().as_secs_f64();
     }
 
     fn stats(&self) -> SamplerStats {
@@ -228,6 +258,30 @@ mod tests {
         let after = share(&sampler);
         // Where no visible light shines, hidden ones are all that is left.
         assert!(before < 0.1 && after > 0.5, "{before} {after}");
+    }
+
+    #[test]
+    fn lights_that_were_never_seen_keep_their_share() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let mut sampler = TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        let logs = observe(&sampler, &scene, 0, |light| light.is_multiple_of(3));
+        sampler.end_frame(&scene, &logs);
+        let near = |light: u32| (sampler.tree.rank[light as usize] as usize) < sampler.tree.leaves.len();
+        // Never drawn: not a number.
+        let share_seen = |light: u32| sampler.visibility.seen(sampler.tree.rank[light as usize]).1;
+        let unseen = |light: u32| share_seen(light).is_nan() || share_seen(light) <= 0.0;
+        let mut small = 0;
+        for point in points(200, 5) {
+            let local = sampler.local(&scene, &point);
+            let total = |wanted: &dyn Fn(u32) -> bool| -> f32 {
+                let lights = (0..scene.lights.len() as u32).filter(|&light| near(light) && wanted(light));
+                lights.map(|light| sampler.pmf(&local, light)).sum()
+            };
+            let (of_unseen, of_all) = (total(&unseen), total(&|_| true));
+            assert!(of_unseen >= 0.0497 * of_all, "{of_unseen} {of_all}");
+            small += i32::from(of_unseen < 0.06 * of_all);
+        }
+        assert!(small > 20, "without the least share it would have been less: {small}");
     }
 
     #[test]

@@ -106,7 +106,7 @@ impl AdaptiveSampler {
             table: TableSampler::net(lights, scene.radius, &within_table),
             cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
             table_mass: (share * 4_294_967_296.0) as u32,
-            schedule: Schedule::default(),
+            schedule: Schedule::new(2),
             frames: 0,
             settings: settings.clone(),
             build_s: start.elapsed().as_secs_f64(),

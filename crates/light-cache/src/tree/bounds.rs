@@ -220,6 +220,11 @@ impl LeafLight {
         }
     }
 
+    /// The same light with another weight.
+    pub(crate) fn with_weight(self, weight: f32) -> Self {
+        Self { weight, ..self }
+    }
+
     /// Index of the light in the scene.
     #[inline]
     pub(crate) fn index(&self) -> u32 {

@@ -17,13 +17,17 @@ const PARALLEL_ABOVE: usize = 4096;
 /// Below this depth groups are halved by count, so that depth stays bounded whatever the lights are.
 const MAX_HEURISTIC_DEPTH: u32 = 56;
 
-/// Sorts `leaves` into tree order and returns the nodes, root first, siblings side by side, depth first.
-pub(super) fn build(leaves: &mut [LeafLight], lights: &[Light]) -> Vec<Node> {
+/// Sorts `leaves` into tree order and returns the nodes, root first, siblings side by side, depth first. `first_split`: how
+/// many of them the root's first child is to hold, if it is not to be chosen by the heuristic.
+pub(super) fn build(leaves: &mut [LeafLight], lights: &[Light], first_split: Option<usize>) -> Vec<Node> {
     let mut nodes = Vec::new();
     if leaves.is_empty() {
         return nodes;
     }
-    let (bounds, root) = build_group(leaves, 0, lights, 0, &mut nodes, 2);
+    let (bounds, root) = match first_split {
+        Some(middle) => build_children(leaves, middle, 0, lights, 0, &mut nodes, 2),
+        None => build_group(leaves, 0, lights, 0, &mut nodes, 2),
+    };
     // The root sits alone in front; the gap keeps every pair of siblings on an even index.
     let root = node(&bounds, root, leaves, 0);
     let gap = Node {
@@ -51,6 +55,19 @@ fn build_group(
         return (all.fold(start, |sum, bounds| sum.union(&bounds)), LEAF);
     }
     let middle = partition(leaves, depth);
+    build_children(leaves, middle, first, lights, depth, nodes, base)
+}
+
+/// The same for a group whose children are its first `middle` lights and the others.
+fn build_children(
+    leaves: &mut [LeafLight],
+    middle: usize,
+    first: u32,
+    lights: &[Light],
+    depth: u32,
+    nodes: &mut Vec<Node>,
+    base: u32,
+) -> (Bounds, u32) {
     let (left, right) = leaves.split_at_mut(middle);
     let right_first = first + middle as u32;
     let children = nodes.len();

@@ -96,6 +96,8 @@ pub(crate) struct Tree {
     pub(crate) distant: Vec<DistantLight>,
     /// Tree order by scene index.
     pub(crate) rank: Vec<u32>,
+    /// Least share that the root's second child has of all lights with a place, wherever it has any; see [`Tree::regrouped`].
+    pub(crate) least_second: f32,
 }
 
 impl Tree {
@@ -115,7 +117,38 @@ impl Tree {
                 leaves.push(LeafLight::new(light, index, strongest));
             }
         }
-        let nodes = build::build(&mut leaves, lights);
+        Self::over(leaves, distant, lights, None, 0.0)
+    }
+
+    /// The same lights in another tree: those at the places that are `preferred` lie below the root's first child, the others below
+    /// its second, which has `least_second` of all samples at least, wherever its lights shine at all: bounds
+    /// around lights that lie all over the scene tell little of those nearby. `strengths`: what the lights weigh, in the tree order of `self`.
+    pub(crate) fn regrouped(&self, lights: &[Light], strengths: &[f32], preferred: &[bool], least_second: f32) -> Self {
+        let of = |wanted: bool| {
+            let weighed = self.leaves.iter().zip(strengths).zip(preferred);
+            let chosen = weighed.filter(move |&(_, &is)| is == wanted);
+            chosen.map(|((leaf, &weight), _)| leaf.with_weight(weight))
+        };
+        let leaves: Vec<LeafLight> = of(true).chain(of(false)).collect();
+        let first = of(true).count();
+        let both = first > 0 && first < leaves.len();
+        Self::over(
+            leaves,
+            self.distant.clone(),
+            lights,
+            both.then_some(first),
+            if both { least_second } else { 0.0 },
+        )
+    }
+
+    fn over(
+        mut leaves: Vec<LeafLight>,
+        distant: Vec<DistantLight>,
+        lights: &[Light],
+        first_split: Option<usize>,
+        least_second: f32,
+    ) -> Self {
+        let nodes = build::build(&mut leaves, lights, first_split);
         let mut rank = vec![0; lights.len()];
         let order = leaves
             .iter()
@@ -129,6 +162,7 @@ impl Tree {
             leaves,
             distant,
             rank,
+            least_second,
         }
     }
 

@@ -61,21 +61,49 @@ impl<'t> Descent<'t> {
     #[inline]
     pub(crate) fn draw(&self, x: u64, width: u64) -> (u32, u64) {
         let near = split(width, self.near, self.far);
-        if x < near {
-            self.draw_in(Some(0), x, near)
-        } else {
-            self.draw_in(None, x - near, width - near)
+        if x >= near {
+            return self.draw_in(None, x - near, width - near);
         }
+        let Some((first, left)) = self.first_of_two(near) else {
+            return self.draw_in(Some(0), x, near);
+        };
+        if x < left {
+            self.draw_in(Some(first), x, left)
+        } else {
+            self.draw_in(Some(first + 1), x - left, near - left)
+        }
+    }
+
+    /// If the root's children are of different standing: the first of them, and its part of an interval of `width`.
+    #[inline]
+    fn first_of_two(&self, width: u64) -> Option<(u32, u64)> {
+        let least = self.tree.least_second;
+        if least <= 0.0 {
+            return None;
+        }
+        let root = &self.tree.nodes[0];
+        let [first, second] = self.children(root).map(|child| self.receiver.group(child));
+        let second = if second > 0.0 {
+            second.max(first * (least / (1.0 - least)))
+        } else {
+            0.0
+        };
+        Some((root.child, split(width, first, second)))
     }
 
     /// The width that the light at `place` owns of an interval of `width`.
     #[inline]
     pub(crate) fn width_of(&self, place: u32, width: u64) -> u64 {
         let near = split(width, self.near, self.far);
-        if (place as usize) < self.tree.leaves.len() {
-            self.width_in(Some(0), place, near)
-        } else {
-            self.width_in(None, place, width - near)
+        if (place as usize) >= self.tree.leaves.len() {
+            return self.width_in(None, place, width - near);
+        }
+        match self.first_of_two(near) {
+            None => self.width_in(Some(0), place, near),
+            Some((first, left)) if place < self.tree.nodes[first as usize + 1].first => {
+                self.width_in(Some(first), place, left)
+            }
+            Some((first, left)) => self.width_in(Some(first + 1), place, near - left),
         }
     }
 
@@ -141,7 +169,13 @@ impl<'t> Descent<'t> {
             sum[self.tree.distant[place].index as usize] += f64::from(probability(own));
         }
         let Some(root) = self.tree.nodes.first() else { return };
-        let mut open = vec![(root, near)];
+        let mut open = match self.first_of_two(near) {
+            None => vec![(root, near)],
+            Some((_, left)) => {
+                let [first, second] = self.children(root);
+                vec![(second, near - left), (first, left)]
+            }
+        };
         while let Some((node, width)) = open.pop() {
             if node.child == LEAF {
                 let weights = self.leaf(node);

@@ -3,6 +3,7 @@
 use crate::Observation;
 use crate::belief::chance_visible;
 use crate::tree::{LEAF, Tree};
+use scene::Light;
 
 /// Pseudo-samples of the prior. Higher values believe neighbours longer; lower values believe few shadow rays.
 const PRIOR_SAMPLES: f32 = 2.0;
@@ -28,6 +29,10 @@ const CAUTIOUS_MIN_PRIOR: f32 = 0.01;
 const GROUP_EXPONENT: f32 = 1.5;
 /// No share is believed to be smaller: keeps sums over a tree within the range of `f32`.
 const MIN_VISIBLE: f32 = 1e-9;
+
+/// Share of the samples that goes to lights which have never been seen to arrive. Higher values find them sooner; lower values
+/// spend less on lights that are hidden.
+const LEAST_UNSEEN: f32 = 0.05;
 
 /// Evidence about a light or a group: shadow rays, and how many arrived, each weighted by the energy at stake.
 #[derive(Clone, Copy, Debug, Default)]
@@ -127,6 +132,22 @@ impl Visibility {
         if observation.visible {
             seen.evidence.visible += times as f32 * energy;
         }
+    }
+
+    /// Puts the lights that have been seen to arrive into a subtree of their own.
+    pub(super) fn regroup(&mut self, tree: &mut Tree, lights: &[Light]) {
+        let arrived: Vec<bool> = self.seen[..tree.leaves.len()]
+            .iter()
+            .map(|seen| seen.evidence.visible > 0.0)
+            .collect();
+        let regrouped = tree.regrouped(lights, &self.strengths, &arrived, LEAST_UNSEEN);
+        let (seen, strengths) = (self.seen.clone(), self.strengths.clone());
+        for (&old, &new) in tree.rank.iter().zip(&regrouped.rank) {
+            self.seen[new as usize] = seen[old as usize];
+            self.strengths[new as usize] = strengths[old as usize];
+        }
+        self.groups = vec![(Evidence::default(), ROOT_VISIBLE); regrouped.nodes.len()];
+        *tree = regrouped;
     }
 
     /// Weighs the tree by what is known.
