@@ -1,6 +1,7 @@
 //! Direct light at a path vertex by drawing one light (next-event estimation).
 
 use crate::path::{Probe, TileLog};
+use crate::resampling;
 use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
@@ -19,6 +20,8 @@ pub(crate) struct Vertex<'v> {
     pub(crate) point: ShadingPoint,
     /// Whether a direction drawn from the BSDF will also look for lights, so that both must share.
     pub(crate) competes: bool,
+    /// Lights compared for each one that is drawn; see [`crate::resampling`].
+    pub(crate) candidates: u32,
 }
 
 /// The random numbers of direct light at a vertex, 32 bits each.
@@ -132,6 +135,9 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         log: &mut TileLog<'_>,
         probe: &mut impl Probe,
     ) -> Direct {
+        if vertex.candidates > 1 {
+            return resampling::estimate(&self.0, scene, local, vertex, numbers, log, probe);
+        }
         let mut choices = [None; MAX_LIGHT_SAMPLES as usize];
         let choices = &mut choices[..numbers.len()];
         match numbers {
@@ -152,15 +158,8 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
                 .as_ref()
                 .is_some_and(|c| c.is_visible(scene, vertex, log, probe));
             if S::LEARNS {
-                log.observations.push(Observation {
-                    point: vertex.point,
-                    light: choice.light,
-                    unshadowed: connection.as_ref().map_or(0.0, Connection::unshadowed),
-                    irradiance: connection.as_ref().map_or(0.0, |c| c.irradiance),
-                    pmf: choice.pmf,
-                    visible,
-                    weight: 1,
-                });
+                log.observations
+                    .push(observation(vertex, *choice, connection.as_ref(), visible));
             }
             if let Some(connection) = connection
                 && visible
@@ -210,6 +209,25 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
     #[inline]
     fn choose(&self, scene: &Scene, point: &ShadingPoint, u: u32) -> Option<Choice> {
         self.0.sample(&self.0.local(scene, point), u)
+    }
+}
+
+/// What was found out about a light; `connection`: `None` if it cannot reach the vertex.
+#[inline(always)]
+pub(crate) fn observation(
+    vertex: &Vertex<'_>,
+    choice: Choice,
+    connection: Option<&Connection>,
+    visible: bool,
+) -> Observation {
+    Observation {
+        point: vertex.point,
+        light: choice.light,
+        unshadowed: connection.map_or(0.0, Connection::unshadowed),
+        irradiance: connection.map_or(0.0, |c| c.irradiance),
+        pmf: choice.pmf,
+        visible,
+        weight: 1,
     }
 }
 
@@ -267,6 +285,17 @@ impl Connection {
     #[inline]
     pub(crate) fn contribution(&self, pmf: f32) -> Vec3 {
         self.unweighted * (self.weight / pmf)
+    }
+
+    /// How much of the light that arrives is reflected along the path, by this strategy's part of the work; above 0, finite.
+    #[inline]
+    pub(crate) fn reflected_share(&self) -> f32 {
+        let share = luminance(self.unweighted) * self.weight / self.irradiance;
+        if share > f32::MIN_POSITIVE {
+            share.min(1e30)
+        } else {
+            f32::MIN_POSITIVE
+        }
     }
 
     /// Luminance of what the light would add if nothing stood in the way, the light being chosen for certain.

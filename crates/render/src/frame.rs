@@ -149,6 +149,7 @@ pub(crate) struct Eye<'s> {
     /// points; a rendering of more repeats it.
     pub(crate) frame: u32,
     pub(crate) light_samples: u32,
+    pub(crate) candidates: u32,
     pub(crate) area_lights: bool,
 }
 
@@ -164,6 +165,7 @@ impl Eye<'_> {
             seed: self.seed,
             frame: self.frame,
             light_samples: self.light_samples,
+            candidates: self.candidates,
             area_lights: self.area_lights,
         }
     }
@@ -299,6 +301,11 @@ impl<'s, F: Frames> Rendering<'s, F> {
                 light_samples: match settings.method {
                     Method::Exact => 1,
                     _ => settings.light_samples,
+                },
+                // The others choose with the reflection in mind already.
+                candidates: match settings.method {
+                    Method::Exact | Method::Oracle => 1,
+                    Method::Sampled(_) => settings.candidates,
                 },
                 area_lights: scene.lights.iter().any(|light| !light.is_delta()),
             },

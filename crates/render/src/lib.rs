@@ -18,6 +18,7 @@ pub mod metric;
 mod oracle;
 mod path;
 pub mod rays;
+mod resampling;
 pub mod settings;
 
 pub use choosing::Choosing;
@@ -25,4 +26,4 @@ pub use error::RenderError;
 pub use film::{Film, Image};
 pub use frame::{FrameLoop, RenderStats, renderer};
 pub use metric::ImageError;
-pub use settings::{MAX_LIGHT_SAMPLES, Method, PixelFilter, Settings};
+pub use settings::{MAX_CANDIDATES, MAX_LIGHT_SAMPLES, Method, PixelFilter, Settings};

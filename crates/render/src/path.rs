@@ -35,6 +35,8 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) frame: u32,
     /// Lights drawn at the first surface.
     pub(crate) light_samples: u32,
+    /// Lights compared for each that is drawn at a glossy surface.
+    pub(crate) candidates: u32,
     /// Whether any light can be hit, so that drawing from the BSDF can find it.
     pub(crate) area_lights: bool,
 }
@@ -304,7 +306,8 @@ pub(crate) fn path<D: DirectLight>(
 
         // Direct light.
         let wo_ws = -ray.direction_ws;
-        let may_hit_light = view.area_lights && is_glossy(&surface.bsdf);
+        let glossy = is_glossy(&surface.bsdf);
+        let may_hit_light = view.area_lights && glossy;
         let continues =
             (bounce < view.max_bounces || may_hit_light) && !is_black(&surface.bsdf) && !scene.lights.is_empty();
         let point = ShadingPoint {
@@ -319,6 +322,7 @@ pub(crate) fn path<D: DirectLight>(
             throughput,
             point,
             competes: continues && view.area_lights,
+            candidates: if glossy { view.candidates } else { 1 },
         };
         let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
         radiance += direct.radiance;
@@ -350,7 +354,7 @@ pub(crate) fn path<D: DirectLight>(
         left = Some(Departure {
             local,
             position_ws: surface.position_ws,
-            light_samples: light_numbers.len() as f32,
+            lights_tried: light_numbers.len() as f32 * vertex.candidates as f32,
             pdf_solid_angle: sample.pdf_solid_angle,
         });
         bounce += 1;
@@ -369,8 +373,8 @@ pub(crate) fn path<D: DirectLight>(
 struct Departure<L> {
     local: L,
     position_ws: Vec3,
-    /// How many lights were drawn there.
-    light_samples: f32,
+    /// How many lights were drawn there, those included that were compared only.
+    lights_tried: f32,
     /// Density with which the BSDF drew the direction.
     pdf_solid_angle: f32,
 }
@@ -383,7 +387,7 @@ impl<L> Departure<L> {
     {
         let pdf_light = view.scene.lights[light as usize].pdf_solid_angle(self.position_ws, wi_ws, distance);
         let pmf = view.direct.pmf(&self.local, light);
-        mis::power(self.pdf_solid_angle, self.light_samples * pmf * pdf_light)
+        mis::power(self.pdf_solid_angle, self.lights_tried * pmf * pdf_light)
     }
 }
 

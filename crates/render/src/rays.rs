@@ -36,6 +36,7 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
         filter: &FilterSampler::new(settings.pixel_filter),
         image_width: settings.width,
         light_samples: 1,
+        candidates: 1,
         max_bounces: settings.max_bounces,
         seed: settings.seed,
         frame,

@@ -95,6 +95,10 @@ pub struct Settings {
     /// eye rays are dear; lower values make more frames. `exact` draws none.
     #[serde(default = "default_light_samples")]
     pub light_samples: u32,
+    /// Lights compared for each one that is drawn at a glossy surface, 1..=[`MAX_CANDIDATES`]: one of them is kept in proportion to what it would
+    /// add there, reflection included. Higher values find the lights that are mirrored; lower values are faster; 1 compares none.
+    #[serde(default = "default_candidates")]
+    pub candidates: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads.
     pub seed: u64,
     /// `oracle`: times that it looks at all lights from every pixel, 1..=65,536. Higher values come closer to the best
@@ -121,6 +125,7 @@ impl Default for Settings {
             method: Method::Sampled(SamplerKind::Adaptive),
             max_bounces: 0,
             light_samples: default_light_samples(),
+            candidates: default_candidates(),
             seed: 0,
             oracle_passes: default_oracle_passes(),
             pixel_filter: PixelFilter::Box,
@@ -133,6 +138,13 @@ impl Default for Settings {
 
 /// Most lights drawn at one surface.
 pub const MAX_LIGHT_SAMPLES: u32 = 8;
+
+/// Most lights compared for one that is drawn.
+pub const MAX_CANDIDATES: u32 = 8;
+
+fn default_candidates() -> u32 {
+    4
+}
 
 fn default_light_samples() -> u32 {
     1
@@ -169,6 +181,9 @@ impl Settings {
         }
         if !(1..=MAX_LIGHT_SAMPLES).contains(&self.light_samples) {
             return refuse(format!("light_samples = {}", self.light_samples), "must be 1 to 8");
+        }
+        if !(1..=MAX_CANDIDATES).contains(&self.candidates) {
+            return refuse(format!("candidates = {}", self.candidates), "must be 1 to 8");
         }
         if !(1..=65_536).contains(&self.oracle_passes) {
             return refuse(
@@ -209,10 +224,12 @@ mod tests {
     fn settings_out_of_range_are_refused_with_the_range() {
         Settings::default().check().expect("the default is valid");
         type Spoil = fn(&mut Settings);
-        let odd: [(&str, Spoil); 9] = [
+        let odd: [(&str, Spoil); 11] = [
             ("0 x 720", |s| s.width = 0),
             ("1280 x 40000", |s| s.height = 40_000),
             ("max_bounces = 2", |s| (s.method, s.max_bounces) = (Method::Oracle, 2)),
+            ("light_samples", |s| s.light_samples = 9),
+            ("candidates", |s| s.candidates = 0),
             ("oracle_passes", |s| s.oracle_passes = 0),
             ("min_probability_mass", |s| s.light.min_probability_mass = 1.5),
             ("min_probability_mass", |s| s.light.min_probability_mass = f32::NAN),

@@ -67,6 +67,12 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "N", default_value_t = render::Settings::default().light_samples,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(render::MAX_LIGHT_SAMPLES)))]
     pub(crate) light_samples: u32,
+    /// Lights compared for each one that is drawn at a glossy surface, 1 to 8: kept in proportion to what it would add
+    ///
+    /// Higher values find the lights that are mirrored; lower values are faster; 1 compares none.
+    #[arg(long, value_name = "N", default_value_t = render::Settings::default().candidates,
+          value_parser = clap::value_parser!(u32).range(1..=i64::from(render::MAX_CANDIDATES)))]
+    pub(crate) candidates: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub(crate) seed: u64,
@@ -150,6 +156,7 @@ impl LightArgs {
             method,
             max_bounces: self.max_bounces,
             light_samples: self.light_samples,
+            candidates: self.candidates,
             seed: self.seed,
             oracle_passes: self.oracle_passes,
             pixel_filter: self.pixel_filter.into(),
