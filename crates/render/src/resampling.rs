@@ -46,7 +46,10 @@ pub(crate) fn estimate<S: LightSampler>(
         let tried = count * vertex.candidates as f32;
         let connections: Candidates<Connection> =
             choices.map(|choice| choice.and_then(|c| Connection::new(scene, vertex, c.light, tried * c.pmf, on_light)));
-        let Some((kept, pmf)) = keep(&choices, &connections, vertex.candidates, unit_f32(numbers.choice)) else {
+        let shares = connections
+            .each_ref()
+            .map(|c| c.as_ref().map_or(0.0, Connection::reflected_share));
+        let Some((kept, times_mean)) = keep(&shares, vertex.candidates, unit_f32(numbers.choice)) else {
             if S::LEARNS {
                 log.observations.push(observation(vertex, *any, None, false));
             }
@@ -55,6 +58,8 @@ pub(crate) fn estimate<S: LightSampler>(
         let (Some(choice), Some(connection)) = (choices[kept], &connections[kept]) else {
             continue;
         };
+        // The target is pmf x share: an estimate of the mean share, over the share of the one that is kept.
+        let pmf = choice.pmf * times_mean;
         let visible = connection.is_visible(scene, vertex, log, probe);
         if S::LEARNS {
             let kept = Choice { pmf, ..choice };
@@ -89,17 +94,9 @@ fn candidates<S: LightSampler>(
     choices
 }
 
-/// Keeps one of `count` candidates in proportion to its reflected share, by the number `u`; with it, the probability by which what it adds is to be
-/// divided. `None` if none is reflected.
-fn keep(
-    choices: &Candidates<Choice>,
-    connections: &Candidates<Connection>,
-    count: u32,
-    u: f32,
-) -> Option<(usize, f32)> {
-    let shares = connections
-        .each_ref()
-        .map(|c| c.as_ref().map_or(0.0, Connection::reflected_share));
+/// Keeps one of `count` candidates in proportion to its share, by the number `u`; with it, how many times its own share is of the mean.
+/// `None` if all shares are zero.
+fn keep(shares: &[f32; MAX_CANDIDATES as usize], count: u32, u: f32) -> Option<(usize, f32)> {
     let total: f32 = shares.iter().sum();
     if !(total > 0.0 && total < f32::INFINITY) {
         return None;
@@ -116,6 +113,49 @@ fn keep(
             rest -= share;
         }
     }
-    let kept = kept?;
-    Some((kept, choices[kept]?.pmf * (count as f32 * (shares[kept] / total))))
+    kept.map(|index| (index, count as f32 * (shares[index] / total)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sampling::Random;
+
+    /// Drawn `1 << 16` times evenly: frequencies are off by less than 8 in 65,536.
+    #[test]
+    fn what_is_kept_and_weighed_is_the_mean_of_all() {
+        for round in 0..200 {
+            let random = Random::new(7, round, 0);
+            let count = 1 + random.u32(0) % MAX_CANDIDATES;
+            let mut shares = [0.0; MAX_CANDIDATES as usize];
+            for (k, share) in (0..count).zip(&mut shares) {
+                *share = (random.f32(1 + k) - 0.3).max(0.0) * 10.0_f32.powi(round as i32 % 7 - 3);
+            }
+            let mut kept = [0_u32; MAX_CANDIDATES as usize];
+            for i in 0..1 << 16 {
+                let Some((index, times_mean)) = keep(&shares, count, i as f32 / 65_536.0) else {
+                    assert_eq!(shares.iter().sum::<f32>(), 0.0);
+                    continue;
+                };
+                kept[index] += 1;
+                let mean = shares.iter().sum::<f32>() / count as f32;
+                assert!((times_mean - shares[index] / mean).abs() < 1e-4 * times_mean);
+            }
+            let total = shares.iter().sum::<f32>().max(f32::MIN_POSITIVE);
+            for (share, kept) in shares.iter().zip(kept) {
+                assert!(
+                    (share / total * 65_536.0 - kept as f32).abs() < 8.0,
+                    "{shares:?} {kept}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn alike_candidates_keep_the_strata() {
+        let shares = [1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
+        for i in 0..64 {
+            assert_eq!(keep(&shares, 4, i as f32 / 64.0), Some((i / 16, 1.0)));
+        }
+    }
 }
