@@ -6,11 +6,13 @@
 //!
 //! Absent from this crate: geometry, lights, files.
 
+pub mod discrepancy;
 pub mod discrete;
 pub mod ggx;
 pub mod hash;
 pub mod hemisphere;
 pub mod mis;
+pub mod points;
 pub mod random;
 pub mod rectangle;
 pub mod sequence;
@@ -21,7 +23,7 @@ pub mod triangle;
 
 pub use discrete::{Discrete, Draw};
 pub use hemisphere::Frame;
-pub use random::{Random, unit_f32};
+pub use random::{Random, Stream, unit_f32, unit_f64};
 pub use rectangle::SphericalRectangle;
 pub use sequence::{PixelSequence, VertexSequence, first_vertices};
 pub use statistics::Moments;
