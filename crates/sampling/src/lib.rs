@@ -6,11 +6,14 @@
 //!
 //! Absent from this crate: geometry, lights, files.
 
+pub mod convergence;
 pub mod discrepancy;
 pub mod discrete;
+pub mod estimators;
 pub mod ggx;
 pub mod hash;
 pub mod hemisphere;
+pub mod integrands;
 pub mod mis;
 pub mod points;
 pub mod random;

@@ -2,6 +2,73 @@
 //!
 //! Written as ratios: the textbook form squares densities, and a density of 1e20 squared is infinite in `f32`.
 
+/// A way to share a contribution among the techniques that could have found it.
+///
+/// With `q_i` the density of technique `i` times its number of samples, a sample of technique `i` gets the weight below. Whatever
+/// the heuristic, the weights of a point sum to 1 over the techniques, so the sum of all weighted contributions is unbiased.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Heuristic {
+    /// `q_i / sum q_k`. Veach's theorem 9.2: no choice of weights has a variance that is smaller by more than
+    /// `(1 / min n_i - 1 / sum n_i)` times the squared integral.
+    Balance,
+    /// `q_i^2 / sum q_k^2`: decides more sharply, which pays where one technique is nearly perfect.
+    #[default]
+    Power,
+    /// As balance, but techniques below a tenth of the largest `q` get nothing.
+    Cutoff,
+    /// The technique with the largest `q` gets everything, the first of equal ones.
+    Maximum,
+}
+
+impl Heuristic {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Balance, Self::Power, Self::Cutoff, Self::Maximum];
+
+    /// Share of the largest `q` below which [`Heuristic::Cutoff`] gives nothing; Veach's section 9.2.2 uses 0.1 as an example.
+    const CUTOFF: f64 = 0.1;
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Balance => "balance",
+            Self::Power => "power",
+            Self::Cutoff => "cutoff",
+            Self::Maximum => "maximum",
+        }
+    }
+
+    /// The weight of a sample of technique `own`, where `q` are the densities of all techniques at the sample, each times its
+    /// number of samples. 0 if `own` could not have found it.
+    ///
+    /// ```
+    /// use sampling::mis::Heuristic;
+    /// assert_eq!(Heuristic::Balance.weight(0, &[3.0, 1.0]), 0.75);
+    /// assert_eq!(Heuristic::Power.weight(0, &[1.0, 0.5]), 0.8);
+    /// assert_eq!(Heuristic::Cutoff.weight(1, &[30.0, 1.0]), 0.0);
+    /// assert_eq!(Heuristic::Maximum.weight(0, &[3.0, 1.0]), 1.0);
+    /// ```
+    pub fn weight(self, own: usize, q: &[f64]) -> f64 {
+        let largest = q.iter().copied().fold(0.0, f64::max);
+        if largest.is_nan() || largest <= 0.0 {
+            return 0.0;
+        }
+        let first_of_largest = q.iter().position(|&q| q == largest);
+        let share = |k: usize| {
+            // Relative to the largest, so that no square overflows.
+            let ratio = q[k] / largest;
+            match self {
+                Self::Balance => ratio,
+                Self::Power => ratio * ratio,
+                Self::Cutoff if ratio < Self::CUTOFF => 0.0,
+                Self::Cutoff => ratio,
+                Self::Maximum if first_of_largest == Some(k) => 1.0,
+                Self::Maximum => 0.0,
+            }
+        };
+        share(own) / (0..q.len()).map(share).sum::<f64>()
+    }
+}
+
 /// Balance heuristic: the weight of a sample drawn with density `a` where the other technique has density `b` (each
 /// times its number of samples, same measure). In `[0, 1]` for every input; a density that is zero, negative or NaN
 /// counts as "never"; `balance(a, b) + balance(b, a)` is 1 unless both are.
@@ -52,6 +119,17 @@ mod tests {
             assert_eq!(heuristic(f32::NAN, 1.0), 0.0);
             assert_eq!(heuristic(1.0, f32::NAN), 1.0);
             assert_eq!(heuristic(-1.0, 1.0), 0.0);
+        }
+    }
+
+    #[test]
+    fn weights_of_all_techniques_sum_to_one() {
+        for heuristic in Heuristic::ALL {
+            for q in [&[1.0][..], &[0.0, 2.0], &[1.0, 1.0, 1.0], &[1e-300, 1e300, 1e300, 5.0]] {
+                let sum: f64 = (0..q.len()).map(|own| heuristic.weight(own, q)).sum();
+                assert!((sum - 1.0).abs() < 1e-15, "{heuristic:?} {q:?}");
+            }
+            assert_eq!(heuristic.weight(0, &[0.0, 0.0]), 0.0);
         }
     }
 
