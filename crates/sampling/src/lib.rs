@@ -4,7 +4,7 @@
 //! thread can ask for any number in any order and gets the same answer. Directions are unit vectors; local frames have
 //! `+z` along the normal; solid angles are in steradians; uniform numbers lie in `[0, 1)`.
 //!
-//! Absent from this crate: geometry, lights, files.
+//! Absent from this crate: scenes, meshes, files. The lights of [`integrands::direct_light`] are formulas to test estimators with.
 
 pub mod convergence;
 pub mod discrepancy;

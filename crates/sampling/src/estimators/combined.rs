@@ -1,7 +1,7 @@
 //! Several techniques for one integral: combined beforehand, or sample by sample.
 
 use super::linear::solve;
-use super::{Estimate, Estimator, combinable, for_each_draw, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_size, sub_seed};
 use crate::integrands::{Integrand, Technique};
 use crate::mis::Heuristic;
 use crate::points::PointSet;
@@ -85,6 +85,10 @@ impl Estimator for APriori {
         }
     }
 
+    fn family(&self) -> Family {
+        Family::Combined
+    }
+
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {
         let techniques = combinable(integrand)?;
         let k = techniques.len();
@@ -127,6 +131,10 @@ pub struct MultipleImportance(pub Heuristic);
 impl Estimator for MultipleImportance {
     fn name(&self) -> String {
         format!("mis {}", self.0.name())
+    }
+
+    fn family(&self) -> Family {
+        Family::Combined
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,6 +1,6 @@
 //! Control variates.
 
-use super::{Estimate, Estimator, for_each_draw, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, for_each_draw, pilot_size, sub_seed};
 use crate::integrands::Integrand;
 use crate::points::PointSet;
 use crate::statistics::Moments;
@@ -24,6 +24,10 @@ impl Estimator for ControlVariate {
             0 => "control".into(),
             _ => format!("control+{}", self.name),
         }
+    }
+
+    fn family(&self) -> Family {
+        Family::Technique
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,6 +1,6 @@
 //! Importance sampling, and its weighted form.
 
-use super::{Bias, Estimate, Estimator, for_each_draw};
+use super::{Bias, Estimate, Estimator, Family, for_each_draw};
 use crate::integrands::Integrand;
 use crate::points::PointSet;
 use crate::statistics::Moments;
@@ -26,6 +26,10 @@ impl Estimator for Importance {
             PointSet::Random => format!("importance {}", self.name),
             points => format!("importance {} {}", self.name, points.name()),
         }
+    }
+
+    fn family(&self) -> Family {
+        Family::Technique
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {
@@ -60,6 +64,10 @@ pub struct WeightedImportance {
 impl Estimator for WeightedImportance {
     fn name(&self) -> String {
         format!("weighted-importance {}", self.name)
+    }
+
+    fn family(&self) -> Family {
+        Family::Technique
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,6 +1,6 @@
 //! Means over point sets, and hit-or-miss.
 
-use super::{Estimate, Estimator};
+use super::{Estimate, Estimator, Family};
 use crate::integrands::Integrand;
 use crate::points::PointSet;
 use crate::random::Stream;
@@ -19,6 +19,13 @@ impl Estimator for PointMean {
         match self.0 {
             PointSet::Random => "crude".into(),
             set => set.name().into(),
+        }
+    }
+
+    fn family(&self) -> Family {
+        match self.0 {
+            PointSet::Random => Family::Blind,
+            _ => Family::Points,
         }
     }
 
@@ -45,6 +52,10 @@ pub struct HitOrMiss;
 impl Estimator for HitOrMiss {
     fn name(&self) -> String {
         "hit-or-miss".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Blind
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

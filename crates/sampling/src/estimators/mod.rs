@@ -63,10 +63,41 @@ pub enum Bias {
     Vanishing(&'static str),
 }
 
+/// What an estimator knows and makes use of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// Nothing but the values of the integrand.
+    Blind,
+    /// Nothing either, but the points are placed better than at random.
+    Points,
+    /// A density or a function like the integrand.
+    Technique,
+    /// Several densities.
+    Combined,
+}
+
+impl Family {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Blind, Self::Points, Self::Technique, Self::Combined];
+
+    /// The name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Blind => "blind",
+            Self::Points => "points",
+            Self::Technique => "technique",
+            Self::Combined => "combined",
+        }
+    }
+}
+
 /// A way to estimate an integral.
 pub trait Estimator: Send + Sync {
     /// The name in tables.
     fn name(&self) -> String;
+
+    /// What it knows.
+    fn family(&self) -> Family;
 
     /// Estimates the integral with about `n` samples. Different seeds give independent estimates. `None` if the method does not exist
     /// for the integrand, or not for so few or so many samples.

@@ -1,7 +1,7 @@
 //! Multiple importance sampling with optimal weights.
 
 use super::linear::solve;
-use super::{Estimate, Estimator, combinable, for_each_draw, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_size, sub_seed};
 use crate::integrands::{Integrand, Technique};
 use crate::points::PointSet;
 use crate::statistics::Moments;
@@ -19,6 +19,10 @@ pub struct OptimalMultipleImportance;
 impl Estimator for OptimalMultipleImportance {
     fn name(&self) -> String {
         "mis optimal".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Combined
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,6 +1,6 @@
 //! Crude Monte Carlo that decides by itself when it is good enough.
 
-use super::{Bias, Estimate, Estimator};
+use super::{Bias, Estimate, Estimator, Family};
 use crate::integrands::Integrand;
 use crate::random::Stream;
 use crate::statistics::{Moments, chi_square_quantile, student_t_quantile};
@@ -69,6 +69,10 @@ impl Estimator for Sequential {
             StoppingRule::StudentT => "sequential-t".into(),
             StoppingRule::ChiSquare => "sequential-chi2".into(),
         }
+    }
+
+    fn family(&self) -> Family {
+        Family::Blind
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,6 +1,6 @@
 //! Strata placed where the integrand varies, and samples allotted to them.
 
-use super::{Estimate, Estimator, MIN_PILOT, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, MIN_PILOT, pilot_size, sub_seed};
 use crate::integrands::Integrand;
 use crate::points::PointSet;
 use crate::random::Stream;
@@ -51,6 +51,10 @@ impl Estimator for VarianceStrata {
             Allotment::VolumeVariance => "strata volume x variance".into(),
             Allotment::Neyman => "strata neyman".into(),
         }
+    }
+
+    fn family(&self) -> Family {
+        Family::Blind
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -1,7 +1,7 @@
 //! Weighted Monte Carlo: samples count for as much of the domain as they stand for.
 
 use super::voronoi::voronoi_areas;
-use super::{Bias, Estimate, Estimator};
+use super::{Bias, Estimate, Estimator, Family};
 use crate::integrands::Integrand;
 use crate::points::PointSet;
 
@@ -20,6 +20,10 @@ pub struct Weighted;
 impl Estimator for Weighted {
     fn name(&self) -> String {
         "weighted".into()
+    }
+
+    fn family(&self) -> Family {
+        Family::Blind
     }
 
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {

@@ -51,7 +51,10 @@ impl Analytic {
 
     fn controlled_by(self, value: fn(&[f64]) -> f64, integral: f64) -> Self {
         Self {
-            control: Some(Control { value, integral }),
+            control: Some(Control {
+                value: Box::new(value),
+                integral,
+            }),
             ..self
         }
     }
@@ -213,7 +216,7 @@ mod tests {
                 integrand.name()
             );
             if let Some(control) = integrand.control() {
-                let mean = points.iter().map(control.value).sum::<f64>() / points.len() as f64;
+                let mean = points.iter().map(|x| (control.value)(x)).sum::<f64>() / points.len() as f64;
                 assert!((mean / control.integral - 1.0).abs() < 2e-3, "{}", integrand.name());
             }
         }

@@ -5,10 +5,19 @@
 //! the unit cube, its natural measures becoming Jacobians: so every estimator can be applied to every integrand.
 
 mod analytic;
+pub mod direct_light;
 mod marginal;
 
 pub use analytic::analytic;
 pub use marginal::{Marginal, Product};
+
+/// All of them: the [`analytic()`] ones, then those of [`direct_light`].
+pub fn all() -> Vec<Box<dyn Integrand>> {
+    let mut all = analytic();
+    all.extend(direct_light::single());
+    all.push(Box::new(direct_light::ManyLights::new()));
+    all
+}
 
 /// A function on the unit cube, and what is known about it.
 pub trait Integrand: Send + Sync {
@@ -59,11 +68,13 @@ pub trait Technique: Send + Sync {
     }
 }
 
+/// A function on the unit cube.
+pub type Function = Box<dyn Fn(&[f64]) -> f64 + Send + Sync>;
+
 /// A function like the integrand whose integral over the cube is known.
-#[derive(Clone, Copy, Debug)]
 pub struct Control {
     /// The function.
-    pub value: fn(&[f64]) -> f64,
+    pub value: Function,
     /// Its integral.
     pub integral: f64,
 }
