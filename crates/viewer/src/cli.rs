@@ -51,6 +51,8 @@ pub(crate) enum Command {
     Compare(cmd::compare::CompareArgs),
     /// Tell what was loaded from a scene and what was ignored, or what this program and machine can do
     Info(cmd::info::InfoArgs),
+    /// Compare Monte Carlo estimators on integrals with known answers
+    Estimate(cmd::estimate::EstimateArgs),
 }
 
 /// Options of everything that renders.

@@ -109,8 +109,7 @@ pub trait Estimator: Send + Sync {
     }
 }
 
-/// Every estimator there is, with every technique of `integrand`; those that do not apply return no estimates. The first is crude
-/// Monte Carlo.
+/// Every estimator that applies to `integrand`, with every technique of it. The first is crude Monte Carlo.
 pub fn all(integrand: &dyn Integrand) -> Vec<Box<dyn Estimator>> {
     let mut list: Vec<Box<dyn Estimator>> = Vec::new();
     list.extend(PointSet::ALL.map(|set| Box::new(PointMean(set)) as Box<dyn Estimator>));
@@ -130,16 +129,21 @@ pub fn all(integrand: &dyn Integrand) -> Vec<Box<dyn Estimator>> {
         }
         list.push(Box::new(WeightedImportance { technique, name }));
     }
-    list.push(Box::new(APriori { correlated: false }));
-    list.push(Box::new(APriori { correlated: true }));
-    list.extend(Heuristic::ALL.map(|heuristic| Box::new(MultipleImportance(heuristic)) as Box<dyn Estimator>));
-    list.push(Box::new(OptimalMultipleImportance));
     for technique in 0..integrand.techniques().len() {
         let name = integrand.techniques()[technique].name().to_string();
         list.push(Box::new(ControlVariate { technique, name }));
     }
+    list.push(Box::new(APriori { correlated: false }));
+    list.push(Box::new(APriori { correlated: true }));
+    list.extend(Heuristic::ALL.map(|heuristic| Box::new(MultipleImportance(heuristic)) as Box<dyn Estimator>));
+    list.push(Box::new(OptimalMultipleImportance));
+    // A method that can do nothing with this many samples can do nothing with any number.
+    list.retain(|estimator| estimator.estimate(integrand, PROBE, 0).is_some());
     list
 }
+
+/// Samples with which a method is asked whether it applies: enough for all, and few enough for [`PointSet::BlueNoise`].
+const PROBE: usize = 256;
 
 /// Share of the samples that methods which look before they leap spend on looking: what they learn decides how the others are used,
 /// and these samples are not used for the estimate, which keeps it unbiased. Higher values choose better; lower values waste less.

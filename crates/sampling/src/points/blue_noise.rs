@@ -1,6 +1,6 @@
 //! Blue noise by void and cluster: R. Ulichney, "The void-and-cluster method for dither array generation" (1993).
 
-use crate::random::Stream;
+use crate::random::{Random, Stream, unit_f64};
 use std::sync::OnceLock;
 
 /// Width and height of the tile.
@@ -123,10 +123,18 @@ fn void_and_cluster() -> Vec<[u16; 2]> {
         .collect()
 }
 
-/// The point of rank `index` (below [`MAX_POINTS`]), `within` its cell.
-pub(super) fn point(index: usize, within: [f64; 2]) -> [f64; 2] {
-    let cell = cells()[index];
-    std::array::from_fn(|axis| (f64::from(cell[axis]) + within[axis]) / SIZE as f64)
+/// The coordinates of the first `n` points (at most [`MAX_POINTS`]): the tile is moved around the torus, and each point around its cell, at random. In the
+/// middles of their cells many points would be a regular grid.
+pub(super) fn points(n: usize, random: &Random) -> Vec<f64> {
+    let moved = [0, 1].map(|axis| random.u32(axis) as usize % SIZE);
+    let mut coordinates = Vec::with_capacity(2 * n);
+    for (cell, first) in cells()[..n].iter().zip((2..).step_by(2)) {
+        for axis in 0..2 {
+            let cell = (usize::from(cell[axis]) + moved[axis]) % SIZE;
+            coordinates.push((cell as f64 + unit_f64(random.u32(first + axis as u32))) / SIZE as f64);
+        }
+    }
+    coordinates
 }
 
 #[cfg(test)]
@@ -145,7 +153,8 @@ mod tests {
     #[test]
     fn points_keep_their_distance() {
         for n in [64, 256, 400, 1024] {
-            let points: Vec<[f64; 2]> = (0..n).map(|i| point(i, [0.5; 2])).collect();
+            let points = points(n, &Random::new(1, 0, 0));
+            let points: Vec<[f64; 2]> = points.chunks_exact(2).map(|p| [p[0], p[1]]).collect();
             let torus = |a: f64, b: f64| (a - b).abs().min(1.0 - (a - b).abs());
             let distance = |p: &[f64; 2], q: &[f64; 2]| torus(p[0], q[0]).hypot(torus(p[1], q[1]));
             let nearest = |p| {

@@ -67,7 +67,7 @@ pub enum PointSet {
     /// Multiples of powers of the generalised golden ratio: M. Roberts, "The unreasonable effectiveness of quasirandom
     /// sequences" (2018).
     R2,
-    /// Void and cluster, on a torus of 64 x 64 cells: 2-D, at most 4,096 points.
+    /// Void and cluster, on a torus of 64 x 64 cells: 2-D, at most 4,096 points, each at random in its cell.
     BlueNoise,
 }
 
@@ -135,40 +135,44 @@ impl PointSet {
         if !self.dimensions().contains(&dimensions) || n > self.max_points() {
             return None;
         }
-        let coordinates = match self {
+        let by_formula = |random: &Random| {
+            let mut coordinates = Vec::with_capacity(n * dimensions);
+            for index in 0..n as u32 {
+                coordinates.extend((0..dimensions).map(|d| self.coordinate(index, n, d, random)));
+            }
+            coordinates
+        };
+        let own = Random::new(seed.unwrap_or(0), purpose::SCRAMBLE, 0);
+        let mut coordinates = match self {
             Self::Random => random(n, dimensions, seed.unwrap_or(0)),
             Self::Stratified => stratified(n, dimensions, seed.unwrap_or(0)),
-            _ => {
-                let mut coordinates = Vec::with_capacity(n * dimensions);
-                for index in 0..n as u32 {
-                    coordinates.extend((0..dimensions).map(|d| self.coordinate(index, n, d, dimensions, seed)));
-                }
-                if let Some(seed) = seed
-                    && !self.is_scrambled()
-                {
-                    shift(&mut coordinates, dimensions, seed);
-                }
-                coordinates
-            }
+            Self::BlueNoise => blue_noise::points(n, &own),
+            Self::R2 => r2(n, dimensions),
+            _ => by_formula(&own),
         };
+        if let Some(seed) = seed
+            && !self.is_random()
+        {
+            shift(&mut coordinates, dimensions, seed);
+        }
         Some(Points {
             dimensions,
             coordinates,
         })
     }
 
-    /// Coordinate `dimension` of `dimensions` of point `index` of `n`, before any shift.
-    fn coordinate(self, index: u32, n: usize, dimension: usize, dimensions: usize, seed: Option<u64>) -> f64 {
-        let scramble = || {
-            // Not a plain hash of the dimension: the leading bits of a scramble depend on few bits of its seed.
-            Random::new(seed.unwrap_or(0), purpose::SCRAMBLE, 0).u32(dimension as u32)
-        };
+    /// Coordinate `dimension` of point `index` of `n`, of the sets that have a formula for it.
+    fn coordinate(self, index: u32, n: usize, dimension: usize, random: &Random) -> f64 {
+        // Random numbers, not a plain hash of the dimension: the leading bits of a scramble depend on few bits of its seed.
+        let scramble = || random.u32(dimension as u32);
         let hammersley = |inverse: fn(u32, u32) -> f64| match dimension {
             0 => f64::from(index) / n as f64,
             _ => inverse(PRIMES[dimension - 1], index),
         };
         match self {
-            Self::Random | Self::Stratified => unreachable!("these have no formula for a single coordinate"),
+            Self::Random | Self::Stratified | Self::BlueNoise | Self::R2 => {
+                unreachable!("these are made as a whole")
+            }
             Self::Halton => radical_inverse(PRIMES[dimension], index),
             Self::ScrambledHalton => scrambled_radical_inverse(PRIMES[dimension], index, scramble()),
             Self::Hammersley => hammersley(radical_inverse),
@@ -176,18 +180,14 @@ impl PointSet {
             Self::Sobol => f64::from(sobol(index, dimension as u32)) / 4_294_967_296.0,
             Self::OwenSobol => unit_f64(owen_scramble(sobol(index, dimension as u32), scramble())),
             Self::Lattice => (radical_inverse(2, index) * f64::from(LATTICE[dimension])).fract(),
-            Self::R2 => {
-                (0.5 + f64::from(index) * generalised_golden_ratio(dimensions).powi(-(dimension as i32 + 1))).fract()
-            }
-            Self::BlueNoise => blue_noise::point(index as usize, [0.5; 2])[dimension],
         }
     }
 
-    /// Whether the set has a randomness of its own.
-    const fn is_scrambled(self) -> bool {
+    /// Whether the set has a randomness of its own: without a seed it is that of seed 0.
+    pub const fn is_random(self) -> bool {
         matches!(
             self,
-            Self::Random | Self::Stratified | Self::ScrambledHalton | Self::OwenSobol
+            Self::Random | Self::Stratified | Self::ScrambledHalton | Self::OwenSobol | Self::BlueNoise
         )
     }
 }
@@ -267,6 +267,17 @@ fn shift(coordinates: &mut [f64], dimensions: usize, seed: u64) {
             *x = (*x + by).fract();
         }
     }
+}
+
+/// `1/2 + i` times the vector of the first powers of the reciprocal golden ratio of so many dimensions.
+fn r2(n: usize, dimensions: usize) -> Vec<f64> {
+    let step = generalised_golden_ratio(dimensions).recip();
+    let steps: Vec<f64> = (1..=dimensions as i32).map(|power| step.powi(power)).collect();
+    let mut coordinates = Vec::with_capacity(n * dimensions);
+    for index in 0..n {
+        coordinates.extend(steps.iter().map(|step| (0.5 + index as f64 * step).fract()));
+    }
+    coordinates
 }
 
 /// The positive root of `x^(d+1) = x + 1`: the golden ratio for `d` = 1.
