@@ -15,6 +15,7 @@ pub mod hash;
 pub mod hemisphere;
 pub mod integrands;
 pub mod mis;
+pub mod pixel;
 pub mod points;
 pub mod random;
 pub mod rectangle;
@@ -26,6 +27,7 @@ pub mod triangle;
 
 pub use discrete::{Discrete, Draw};
 pub use hemisphere::Frame;
+pub use pixel::PixelSampler;
 pub use random::{Random, Stream, unit_f32, unit_f64};
 pub use rectangle::SphericalRectangle;
 pub use sequence::{PixelSequence, VertexSequence, first_vertices};

@@ -69,6 +69,30 @@ impl Heuristic {
     }
 }
 
+impl Heuristic {
+    /// [`Heuristic::weight`] of the first of two techniques with densities `a` and `b` (each times its number of samples), in `f32` and safe for
+    /// densities that are zero, infinite or no number, as [`balance`] is.
+    #[inline]
+    pub fn of_two(self, a: f32, b: f32) -> f32 {
+        match self {
+            Self::Balance => balance(a, b),
+            Self::Power => power(a, b),
+            Self::Cutoff => weight(a, b, |ratio| {
+                let cutoff = Self::CUTOFF as f32;
+                if ratio < cutoff {
+                    0.0
+                } else if ratio * cutoff > 1.0 {
+                    f32::INFINITY
+                } else {
+                    ratio
+                }
+            }),
+            // Equal ones share, since neither is the first.
+            Self::Maximum => weight(a, b, |ratio| if ratio < 1.0 { 0.0 } else { f32::INFINITY }),
+        }
+    }
+}
+
 /// Balance heuristic: the weight of a sample drawn with density `a` where the other technique has density `b` (each
 /// times its number of samples, same measure). In `[0, 1]` for every input; a density that is zero, negative or NaN
 /// counts as "never"; `balance(a, b) + balance(b, a)` is 1 unless both are.
@@ -107,7 +131,8 @@ mod tests {
 
     #[test]
     fn edge_cases_are_weights_that_sum_to_one() {
-        for heuristic in [balance, power] {
+        let heuristics = Heuristic::ALL.map(|h| move |a, b| h.of_two(a, b));
+        for heuristic in heuristics {
             for a in EDGE {
                 for b in EDGE {
                     let sum = heuristic(a, b) + heuristic(b, a);
@@ -134,6 +159,14 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn two_techniques_are_weighed_as_any_number(a in 1e-6_f32..1e6, b in 1e-6_f32..1e6) {
+            for heuristic in Heuristic::ALL {
+                let expected = heuristic.weight(0, &[f64::from(a), f64::from(b)]);
+                prop_assert!((f64::from(heuristic.of_two(a, b)) - expected).abs() < 1e-6 || a == b);
+            }
+        }
+
         #[test]
         fn agrees_with_the_textbook(a in 1e-6_f32..1e6, b in 1e-6_f32..1e6) {
             let (x, y) = (f64::from(a), f64::from(b));

@@ -4,10 +4,10 @@ use crate::random::{Random, Stream, unit_f64};
 use std::sync::OnceLock;
 
 /// Width and height of the tile.
-const SIZE: usize = 64;
+pub(crate) const SIZE: usize = 64;
 
 /// Points that the tile has.
-pub(super) const MAX_POINTS: usize = SIZE * SIZE;
+pub(crate) const MAX_POINTS: usize = SIZE * SIZE;
 
 /// Standard deviation, in cells, of the Gaussian by which Ulichney tells crowded from empty: his section 4 recommends 1.5.
 const SIGMA: f64 = 1.5;
@@ -22,6 +22,18 @@ const INITIAL_SHARE: usize = 10;
 pub(super) fn cells() -> &'static [[u16; 2]] {
     static CELLS: OnceLock<Vec<[u16; 2]>> = OnceLock::new();
     CELLS.get_or_init(void_and_cluster)
+}
+
+/// The tile as a dither mask: the rank of each cell, row by row, as 32 bits after the point.
+pub(crate) fn mask() -> &'static [u32] {
+    static MASK: OnceLock<Vec<u32>> = OnceLock::new();
+    MASK.get_or_init(|| {
+        let mut mask = vec![0; MAX_POINTS];
+        for (rank, &[column, row]) in (0_u32..).zip(cells()) {
+            mask[usize::from(row) * SIZE + usize::from(column)] = rank * (u32::MAX / MAX_POINTS as u32 + 1);
+        }
+        mask
+    })
 }
 
 /// A pattern of chosen cells and how crowded it is around every cell.

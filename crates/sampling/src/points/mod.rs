@@ -22,7 +22,7 @@
 //! assert!((mean(PointSet::OwenSobol) - 0.25).abs() < 0.000_3);
 //! ```
 
-mod blue_noise;
+pub(crate) mod blue_noise;
 mod radical_inverse;
 
 pub use radical_inverse::{PRIMES, folded_radical_inverse, radical_inverse, scrambled_radical_inverse};
