@@ -95,7 +95,7 @@ where
         .y_desc(labels.y)
         .label_style(("sans-serif", 14))
         .x_label_formatter(&|x| format!("{x}"))
-        .y_label_formatter(&|y| format!("{y:e}"))
+        .y_label_formatter(&|&y| short(y))
         .light_line_style(BLACK.mix(0.06))
         .bold_line_style(BLACK.mix(0.15))
         .draw()?;
@@ -121,7 +121,24 @@ where
     Ok(())
 }
 
+/// At most three significant digits: powers of ten computed by the plotter are not exact.
+fn short(y: f64) -> String {
+    let rounded: f64 = format!("{y:.2e}").parse().unwrap_or(y);
+    format!("{rounded:e}")
+}
+
 /// Whether a point has a place on logarithmic axes.
 fn drawable((x, y): &(f64, f64)) -> bool {
     *x > 0.0 && *y > 0.0 && x.is_finite() && y.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::short;
+
+    #[test]
+    fn labels_are_short() {
+        assert_eq!(short(0.000_099_999_999_999), "1e-4");
+        assert_eq!(short(0.002_5), "2.5e-3");
+    }
 }

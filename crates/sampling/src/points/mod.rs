@@ -12,6 +12,8 @@
 //! | [`PointSet::Lattice`] | `N^(-1)`, periodic `N^(-2)` | about `N^(-3/4)` | Korobov (1959), Cools, Kuo and Nuyens (2006) |
 //! | [`PointSet::BlueNoise`] | `N^(-1/2)` to `N^(-1)` | about `N^(-3/4)` | Ulichney (1993) |
 //!
+//! `docs/monte-carlo.md` has pictures of them and their errors; `manylight estimate` makes both anew.
+//!
 //! ```
 //! use sampling::points::PointSet;
 //! let mean = |set: PointSet| {
