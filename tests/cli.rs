@@ -1,6 +1,7 @@
 //! The program as people and scripts meet it: exit codes, messages, files, pipes.
 
 mod measuring;
+mod sampling;
 
 use serde_json::{Value, json};
 use std::io::Read;

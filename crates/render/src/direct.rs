@@ -5,7 +5,8 @@ use crate::resampling;
 use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
-use sampling::{VertexSequence, mis, unit_f32};
+use sampling::mis::Heuristic;
+use sampling::{VertexSequence, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 
 /// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
@@ -18,8 +19,8 @@ pub(crate) struct Vertex<'v> {
     /// Weight of the path up to here.
     pub(crate) throughput: Vec3,
     pub(crate) point: ShadingPoint,
-    /// Whether a direction drawn from the BSDF will also look for lights, so that both must share.
-    pub(crate) competes: bool,
+    /// If a direction drawn from the BSDF will also look for lights: how both share what they find.
+    pub(crate) shared: Option<Heuristic>,
     /// Lights compared for each one that is drawn; see [`crate::resampling`].
     pub(crate) candidates: u32,
 }
@@ -262,13 +263,12 @@ impl Connection {
             return None;
         }
         let record = &scene.lights[light as usize];
-        let (weight, weight_if_certain) = if vertex.competes && !record.is_delta() {
-            (
-                mis::power(pmf * point.pdf_solid_angle, pdf_bsdf),
-                mis::power(point.pdf_solid_angle, pdf_bsdf),
-            )
-        } else {
-            (1.0, 1.0)
+        let (weight, weight_if_certain) = match vertex.shared {
+            Some(heuristic) if !record.is_delta() => (
+                heuristic.of_two(pmf * point.pdf_solid_angle, pdf_bsdf),
+                heuristic.of_two(point.pdf_solid_angle, pdf_bsdf),
+            ),
+            _ => (1.0, 1.0),
         };
         Some(Self {
             unweighted,

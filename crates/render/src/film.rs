@@ -249,6 +249,30 @@ impl Film {
         })
     }
 
+    /// The relMSE that the image is estimated to have, from the variances of its own pixels: the mean of variance / (Y^2 + 0.01 mean(Y)^2), Y being
+    /// luminance. Infinite before the second frame. Samples that are spread evenly do better than their variance says, so it is rather too
+    /// high.
+    pub fn estimated_relmse(&self) -> f64 {
+        if self.frames < 2 {
+            return f64::INFINITY;
+        }
+        let image = self.image();
+        let luminance = |pixel: &[f32; 3]| f64::from(luminance(Vec3::from(*pixel)));
+        let count = image.pixels.len() as f64;
+        let mean = image.pixels.iter().map(luminance).sum::<f64>() / count;
+        let offset = 0.01 * mean * mean;
+        if offset <= 0.0 {
+            // Black all over: nothing has varied.
+            return 0.0;
+        }
+        let variance = self.variance();
+        let pixels = image.pixels.iter().zip(&variance);
+        pixels
+            .map(|(pixel, variance)| f64::from(*variance) / (luminance(pixel).powi(2) + offset))
+            .sum::<f64>()
+            / count
+    }
+
     /// Samples per pixel so far.
     pub fn spp(&self) -> u64 {
         self.frames
@@ -312,6 +336,21 @@ impl Film {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A pixel that is 0 or 2 by turns has variance n / (n - 1) of a sample, and 1 / (n - 1) of the mean, which is 1.
+    #[test]
+    fn the_error_is_estimated_from_the_variances() {
+        let film = filled(20, 9, 101, |frame, x, _| {
+            Vec3::splat(if (frame + x) % 2 == 0 { 0.0 } else { 2.0 })
+        });
+        assert!(
+            (film.estimated_relmse() - 0.01 / 1.01).abs() < 1e-3,
+            "{}",
+            film.estimated_relmse()
+        );
+        assert_eq!(filled(4, 4, 1, |_, _, _| Vec3::ONE).estimated_relmse(), f64::INFINITY);
+        assert_eq!(filled(4, 4, 9, |_, _, _| Vec3::ZERO).estimated_relmse(), 0.0);
+    }
 
     /// Adds `sample(frame, x, y)` to every pixel, `frames` times.
     fn filled(width: u32, height: u32, frames: u32, sample: impl Fn(u32, u32, u32) -> Vec3) -> Film {

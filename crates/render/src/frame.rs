@@ -9,6 +9,8 @@ use crate::path::{Counters, FrameView, TileLog, render_tile};
 use crate::{Film, Method, RenderError, Settings};
 use light_cache::{CellRecord, LightRecord, LightSampler, Observation, Recording, SamplerStats, Visitor};
 use rayon::prelude::*;
+use sampling::PixelSampler;
+use sampling::mis::Heuristic;
 use scene::camera::CameraRays;
 use scene::{Camera, Scene};
 use std::ops::Add;
@@ -143,6 +145,8 @@ pub(crate) struct Eye<'s> {
     pub(crate) filter: FilterSampler,
     pub(crate) image_width: u32,
     pub(crate) image_height: u32,
+    pub(crate) pixel_sampler: PixelSampler,
+    pub(crate) mis: Option<Heuristic>,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u64,
     /// Number of the next frame since the start of the rendering, whatever has changed since. The sequence has 2^32
@@ -161,6 +165,8 @@ impl Eye<'_> {
             camera: self.camera,
             filter: &self.filter,
             image_width: self.image_width,
+            pixel_sampler: self.pixel_sampler,
+            mis: self.mis,
             max_bounces: self.max_bounces,
             seed: self.seed,
             frame: self.frame,
@@ -295,6 +301,8 @@ impl<'s, F: Frames> Rendering<'s, F> {
                 filter: FilterSampler::new(settings.pixel_filter),
                 image_width: settings.width,
                 image_height: settings.height,
+                pixel_sampler: settings.pixel_sampler,
+                mis: settings.mis.heuristic(),
                 max_bounces: settings.max_bounces,
                 seed: settings.seed,
                 frame: 0,

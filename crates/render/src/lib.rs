@@ -26,4 +26,4 @@ pub use error::RenderError;
 pub use film::{Film, Image};
 pub use frame::{FrameLoop, RenderStats, renderer};
 pub use metric::ImageError;
-pub use settings::{MAX_CANDIDATES, MAX_LIGHT_SAMPLES, Method, PixelFilter, Settings};
+pub use settings::{MAX_CANDIDATES, MAX_LIGHT_SAMPLES, Method, Mis, PixelFilter, Settings};

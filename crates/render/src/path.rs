@@ -7,7 +7,8 @@ use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
 use sampling::hash::hash2;
-use sampling::{PixelSequence, first_vertices, mis, unit_f32};
+use sampling::mis::Heuristic;
+use sampling::{PixelSampler, PixelSequence, first_vertices, unit_f32};
 #[cfg(target_arch = "x86_64")]
 use scene::bvh::Kernel;
 use scene::bvh::{PACKET, Packet};
@@ -29,6 +30,9 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) camera: CameraRays,
     pub(crate) filter: &'f FilterSampler,
     pub(crate) image_width: u32,
+    pub(crate) pixel_sampler: PixelSampler,
+    /// How light sampling and BSDF sampling share what both can find; `None`: light sampling alone finds lights.
+    pub(crate) mis: Option<Heuristic>,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u64,
     /// Number of the frame in its sequence of random numbers = sample number of every pixel.
@@ -193,7 +197,9 @@ impl Starts {
     #[inline(always)]
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let first_pixel = y * view.image_width + x;
-        let in_pixel: [[u32; PACKET]; 2] = first_vertices(view.seed, first_pixel, view.frame, 0);
+        let in_pixel: [[u32; PACKET]; 2] =
+            view.pixel_sampler
+                .positions(view.seed, [x, y], view.image_width, view.frame);
         let mut light_numbers = [[[0; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize];
         for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
             *numbers = first_vertices(view.seed, first_pixel, index, 2);
@@ -234,7 +240,9 @@ impl Start {
     /// In one pixel, without its neighbours.
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let pixel = y * view.image_width + x;
-        let [[u], [v]] = first_vertices(view.seed, pixel, view.frame, 0);
+        let [[u], [v]] = view
+            .pixel_sampler
+            .positions(view.seed, [x, y], view.image_width, view.frame);
         let mut light_numbers = [LightNumbers::default(); MAX_LIGHT_SAMPLES as usize];
         for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
             let [[choice], [u], [v]] = first_vertices(view.seed, pixel, index, 2);
@@ -307,7 +315,8 @@ pub(crate) fn path<D: DirectLight>(
         // Direct light.
         let wo_ws = -ray.direction_ws;
         let glossy = is_glossy(&surface.bsdf);
-        let may_hit_light = view.area_lights && glossy;
+        let shared = view.mis.filter(|_| view.area_lights);
+        let may_hit_light = shared.is_some() && glossy;
         let continues =
             (bounce < view.max_bounces || may_hit_light) && !is_black(&surface.bsdf) && !scene.lights.is_empty();
         let point = ShadingPoint {
@@ -321,7 +330,7 @@ pub(crate) fn path<D: DirectLight>(
             wo_ws,
             throughput,
             point,
-            competes: continues && view.area_lights,
+            shared: shared.filter(|_| continues),
             candidates: if glossy { view.candidates } else { 1 },
         };
         let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
@@ -385,9 +394,10 @@ impl<L> Departure<L> {
     where
         D: DirectLight<Local<'f> = L>,
     {
+        let Some(heuristic) = view.mis else { return 0.0 };
         let pdf_light = view.scene.lights[light as usize].pdf_solid_angle(self.position_ws, wi_ws, distance);
         let pmf = view.direct.pmf(&self.local, light);
-        mis::power(self.pdf_solid_angle, self.lights_tried * pmf * pdf_light)
+        heuristic.of_two(self.pdf_solid_angle, self.lights_tried * pmf * pdf_light)
     }
 }
 

@@ -35,6 +35,8 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
         camera: camera.rays(settings.width, settings.height),
         filter: &FilterSampler::new(settings.pixel_filter),
         image_width: settings.width,
+        pixel_sampler: settings.pixel_sampler,
+        mis: settings.mis.heuristic(),
         light_samples: 1,
         candidates: 1,
         max_bounces: settings.max_bounces,

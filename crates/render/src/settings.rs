@@ -2,6 +2,8 @@
 
 use crate::RenderError;
 use light_cache::SamplerKind;
+use sampling::PixelSampler;
+use sampling::mis::Heuristic;
 use serde::{Deserialize, Serialize};
 
 /// How direct light is found. Written and read by its name.
@@ -79,6 +81,44 @@ pub enum PixelFilter {
     BlackmanHarris,
 }
 
+/// How light sampling and BSDF sampling share what both can find.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Mis {
+    /// In proportion to the densities.
+    Balance,
+    /// In proportion to their squares.
+    #[default]
+    Power,
+    /// As balance, but nothing for densities below a tenth of the other.
+    Cutoff,
+    /// The larger density takes all.
+    Maximum,
+    /// Lights are found by light sampling only.
+    None,
+}
+
+impl Mis {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Balance, Self::Power, Self::Cutoff, Self::Maximum, Self::None];
+
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        self.heuristic().map_or("none", Heuristic::name)
+    }
+
+    /// The heuristic; `None` where there is nothing to share.
+    pub(crate) fn heuristic(self) -> Option<Heuristic> {
+        match self {
+            Self::Balance => Some(Heuristic::Balance),
+            Self::Power => Some(Heuristic::Power),
+            Self::Cutoff => Some(Heuristic::Cutoff),
+            Self::Maximum => Some(Heuristic::Maximum),
+            Self::None => None,
+        }
+    }
+}
+
 /// Knobs of rendering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -107,6 +147,12 @@ pub struct Settings {
     pub oracle_passes: u32,
     /// Pixel filter.
     pub pixel_filter: PixelFilter,
+    /// How samples are spread over the area of a pixel, by the name of a [`PixelSampler`].
+    #[serde(default, with = "pixel_sampler_name")]
+    pub pixel_sampler: PixelSampler,
+    /// How light sampling and BSDF sampling share what both can find.
+    #[serde(default)]
+    pub mis: Mis,
     /// Light choice.
     pub light: light_cache::Settings,
     /// Whether auxiliary images (albedo, normal, depth, position, chosen light) are kept. Costs time.
@@ -129,10 +175,31 @@ impl Default for Settings {
             seed: 0,
             oracle_passes: default_oracle_passes(),
             pixel_filter: PixelFilter::Box,
+            pixel_sampler: PixelSampler::default(),
+            mis: Mis::default(),
             light: light_cache::Settings::default(),
             aovs: false,
             record_lights: false,
         }
+    }
+}
+
+/// [`PixelSampler`] written and read by its name.
+mod pixel_sampler_name {
+    use sampling::PixelSampler;
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(sampler: &PixelSampler, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(sampler.name())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<PixelSampler, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let found = PixelSampler::ALL.into_iter().find(|sampler| sampler.name() == name);
+        found.ok_or_else(|| {
+            let names = PixelSampler::ALL.map(PixelSampler::name).join(", ");
+            D::Error::custom(format!("no pixel sampler '{name}'; try one of: {names}"))
+        })
     }
 }
 

@@ -4,13 +4,19 @@
 //! thread can ask for any number in any order and gets the same answer. Directions are unit vectors; local frames have
 //! `+z` along the normal; solid angles are in steradians; uniform numbers lie in `[0, 1)`.
 //!
-//! Absent from this crate: geometry, lights, files.
+//! Absent from this crate: scenes, meshes, files. The lights of [`integrands::direct_light`] are formulas to test estimators with.
 
+pub mod convergence;
+pub mod discrepancy;
 pub mod discrete;
+pub mod estimators;
 pub mod ggx;
 pub mod hash;
 pub mod hemisphere;
+pub mod integrands;
 pub mod mis;
+pub mod pixel;
+pub mod points;
 pub mod random;
 pub mod rectangle;
 pub mod sequence;
@@ -21,7 +27,8 @@ pub mod triangle;
 
 pub use discrete::{Discrete, Draw};
 pub use hemisphere::Frame;
-pub use random::{Random, unit_f32};
+pub use pixel::PixelSampler;
+pub use random::{Random, Stream, unit_f32, unit_f64};
 pub use rectangle::SphericalRectangle;
 pub use sequence::{PixelSequence, VertexSequence, first_vertices};
 pub use statistics::Moments;

@@ -9,6 +9,12 @@ pub fn unit_f32(bits: u32) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
+/// Maps 32 bits to the middles of 2^32 equal parts of `(0, 1)`: unbiased, and neither end is reached.
+#[inline]
+pub fn unit_f64(bits: u32) -> f64 {
+    (f64::from(bits) + 0.5) * (1.0 / 4_294_967_296.0)
+}
+
 /// The independent random numbers of one pixel in one frame.
 ///
 /// Use them where strata do not help (Russian roulette at late vertices, jitter); [`crate::PixelSequence`] is the
@@ -46,6 +52,38 @@ impl Random {
     #[inline]
     pub fn vec2(&self, first_dimension: u32) -> Vec2 {
         Vec2::new(self.f32(first_dimension), self.f32(first_dimension + 1))
+    }
+}
+
+/// Independent random numbers one after the other, for whoever cannot tell beforehand how many it takes.
+#[derive(Clone, Debug)]
+pub struct Stream {
+    random: Random,
+    next: u32,
+}
+
+impl Stream {
+    /// The numbers of `seed` and `purpose`. Different arguments give streams that share nothing.
+    #[inline]
+    pub const fn new(seed: u64, purpose: u32) -> Self {
+        Self {
+            random: Random::new(seed, purpose, 0),
+            next: 0,
+        }
+    }
+
+    /// The next number, in `(0, 1)`. Repeats after 2^32.
+    #[inline]
+    pub fn number(&mut self) -> f64 {
+        let number = unit_f64(self.random.u32(self.next));
+        self.next = self.next.wrapping_add(1);
+        number
+    }
+
+    /// Fills `point` with the next numbers.
+    #[inline]
+    pub fn fill(&mut self, point: &mut [f64]) {
+        point.iter_mut().for_each(|u| *u = self.number());
     }
 }
 

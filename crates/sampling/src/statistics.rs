@@ -1,5 +1,6 @@
 //! Moments of samples, and the p-values statistical tests are decided by.
 
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
 use statrs::function::{erf::erfc, gamma::gamma_ur};
 
 /// Running mean and variance (B. P. Welford, "Note on a Method for Calculating Corrected Sums of Squares and Products", 1962) in `f64`.
@@ -82,6 +83,26 @@ pub fn normal_p_two_sided(z: f64) -> f64 {
     }
 }
 
+/// The value that a Student-t variable of `dof` degrees of freedom stays below with probability `p`. NaN if `dof` is 0 or `p`
+/// is not in `(0, 1)`.
+pub fn student_t_quantile(p: f64, dof: usize) -> f64 {
+    let possible = p > 0.0 && p < 1.0;
+    match StudentsT::new(0.0, 1.0, dof as f64) {
+        Ok(distribution) if possible => distribution.inverse_cdf(p),
+        _ => f64::NAN,
+    }
+}
+
+/// The value that a chi-square variable of `dof` degrees of freedom stays below with probability `p`. NaN if `dof` is 0 or `p`
+/// is not in `(0, 1)`.
+pub fn chi_square_quantile(p: f64, dof: usize) -> f64 {
+    let possible = p > 0.0 && p < 1.0;
+    match ChiSquared::new(dof as f64) {
+        Ok(distribution) if possible => distribution.inverse_cdf(p),
+        _ => f64::NAN,
+    }
+}
+
 /// Significance for each of `n` independent tests such that any of them fails with probability `alpha`: Z. Sidak (1967).
 pub fn sidak(alpha: f64, n: usize) -> f64 {
     -((-alpha).ln_1p() / n.max(1) as f64).exp_m1()
@@ -136,6 +157,15 @@ mod tests {
         assert_eq!(chi_square_p(0.0, 3), 1.0);
         let each = sidak(0.01, 1000);
         assert!((1.0 - (1.0 - each).powi(1000) - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn quantiles_agree_with_tables() {
+        assert!((student_t_quantile(0.975, 10) - 2.228_139).abs() < 1e-5);
+        assert!((student_t_quantile(0.95, 1) - 6.313_752).abs() < 1e-5);
+        assert!((chi_square_quantile(0.05, 10) - 3.940_299).abs() < 1e-5);
+        assert!((chi_square_quantile(0.95, 1) - 3.841_459).abs() < 1e-5);
+        assert!(student_t_quantile(0.9, 0).is_nan() && chi_square_quantile(1.0, 5).is_nan());
     }
 
     #[test]

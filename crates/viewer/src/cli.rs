@@ -6,7 +6,8 @@ use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use light_cache::SamplerKind;
-use render::{Method, PixelFilter};
+use render::{Method, Mis, PixelFilter};
+use sampling::PixelSampler;
 
 /// Renders scenes with very many lights, and learns which of them matter.
 #[derive(Debug, Parser)]
@@ -51,6 +52,8 @@ pub(crate) enum Command {
     Compare(cmd::compare::CompareArgs),
     /// Tell what was loaded from a scene and what was ignored, or what this program and machine can do
     Info(cmd::info::InfoArgs),
+    /// Compare Monte Carlo estimators on integrals with known answers
+    Estimate(cmd::estimate::EstimateArgs),
 }
 
 /// Options of everything that renders.
@@ -88,6 +91,12 @@ pub(crate) struct LightArgs {
     /// How samples are spread around a pixel's centre
     #[arg(long, value_enum, default_value_t = Filter::Box)]
     pub(crate) pixel_filter: Filter,
+    /// How samples are spread over a pixel's area
+    #[arg(long, value_name = "NAME", default_value = PixelSampler::default().name(), value_parser = pixel_sampler())]
+    pub(crate) pixel_sampler: PixelSampler,
+    /// How drawing a light and meeting one by chance share what both can find; none = draw only
+    #[arg(long, value_name = "HEURISTIC", default_value = Mis::default().name(), value_parser = mis())]
+    pub(crate) mis: Mis,
     /// Probability shared equally by all lights, whatever was learned, 0 to 1
     ///
     /// Higher values find overlooked lights sooner; lower values waste fewer samples.
@@ -160,6 +169,8 @@ impl LightArgs {
             seed: self.seed,
             oracle_passes: self.oracle_passes,
             pixel_filter: self.pixel_filter.into(),
+            pixel_sampler: self.pixel_sampler,
+            mis: self.mis,
             light: light_cache::Settings {
                 min_probability_mass: self.min_probability_mass,
                 ignore_below: self.ignore_below,
@@ -238,6 +249,23 @@ fn methods(accepted: Vec<Method>) -> impl TypedValueParser<Value = Method> {
     PossibleValuesParser::new(values.collect::<Vec<_>>()).try_map(move |name| {
         let found = accepted.iter().copied().find(|m| m.name() == name);
         found.ok_or("no such sampler")
+    })
+}
+
+/// Accepts the names of all pixel samplers.
+fn pixel_sampler() -> impl TypedValueParser<Value = PixelSampler> {
+    let all = PixelSampler::ALL;
+    PossibleValuesParser::new(all.map(PixelSampler::name)).try_map(move |name| {
+        let found = all.into_iter().find(|sampler| sampler.name() == name);
+        found.ok_or("no such pixel sampler")
+    })
+}
+
+/// Accepts the names of all ways to share.
+fn mis() -> impl TypedValueParser<Value = Mis> {
+    PossibleValuesParser::new(Mis::ALL.map(Mis::name)).try_map(|name| {
+        let found = Mis::ALL.into_iter().find(|mis| mis.name() == name);
+        found.ok_or("no such heuristic")
     })
 }
 

@@ -14,6 +14,7 @@ mod interrupt;
 mod machine;
 mod message;
 mod output;
+mod plot;
 mod progress;
 mod session;
 mod table;
@@ -39,6 +40,7 @@ pub fn run() -> ExitCode {
         Command::Dump(args) => cmd::dump::run(args),
         Command::Compare(args) => cmd::compare::run(args),
         Command::Info(args) => cmd::info::run(args),
+        Command::Estimate(args) => cmd::estimate::run(args),
     });
     match outcome {
         Ok(status) => status.into(),

@@ -42,17 +42,18 @@ impl Progress {
     pub(crate) fn update(&mut self, done: f64, frames: u64, pixels: u64) {
         let seconds = self.start.elapsed().as_secs_f64().max(1e-9);
         let speed = (frames * pixels) as f64 / seconds * 1e-6;
+        self.step(done, &format!("{frames} spp, {speed:.2} Msamples/s"));
+    }
+
+    /// `done` of the job (0 to 1) is done; `what` says it in other words.
+    pub(crate) fn step(&mut self, done: f64, what: &str) {
         if let Some(bar) = &self.bar {
             bar.set_position((done * STEPS as f64) as u64);
-            bar.set_message(format!("{frames} spp  {speed:.2} Msamples/s"));
+            bar.set_message(what.to_string());
         } else if (done * 10.0) as u64 > self.tenths {
             self.tenths = (done * 10.0) as u64;
-            let seconds = table::number(seconds);
-            message::note(format!(
-                "{}: {} %, {frames} spp, {seconds} s, {speed:.2} Msamples/s",
-                self.what,
-                self.tenths * 10
-            ));
+            let seconds = table::number(self.start.elapsed().as_secs_f64());
+            message::note(format!("{}: {} %, {seconds} s, {what}", self.what, self.tenths * 10));
         }
     }
 }

@@ -136,7 +136,12 @@ pub(crate) struct Budget {
     pub(crate) frames: Option<u64>,
     /// After so many seconds of rendering.
     pub(crate) seconds: Option<f64>,
+    /// When the estimated relMSE is below this.
+    pub(crate) relmse: Option<f64>,
 }
+
+/// Frames before the first look at the estimated error: variances of fewer are not worth a decision.
+const FIRST_LOOK: u64 = 16;
 
 impl Budget {
     /// What the options say; `default` frames if they say nothing.
@@ -145,7 +150,15 @@ impl Budget {
         Self {
             frames,
             seconds: args.time,
+            relmse: None,
         }
+    }
+
+    /// The same, or as soon as the estimated relMSE is below `relmse`.
+    pub(crate) fn until(self, relmse: Option<f64>, args: &BudgetArgs) -> Self {
+        // The default number of frames is for those who do not say when to stop.
+        let frames = if relmse.is_some() { args.spp } else { self.frames };
+        Self { frames, relmse, ..self }
     }
 
     /// The part that is done, 1 at the end.
@@ -168,12 +181,22 @@ pub(crate) fn render_frames(
     let pixels = u64::from(frame_loop.film().width()) * u64::from(frame_loop.film().height());
     let mut progress = Progress::new(what);
     let (mut frames, mut seconds) = (0, 0.0);
+    let mut next_look = FIRST_LOOK;
     loop {
         let start = Instant::now();
         frame_loop.render_frame();
         seconds += start.elapsed().as_secs_f64();
         frames += 1;
-        let done = budget.done(frames, seconds);
+        let mut done = budget.done(frames, seconds);
+        if let Some(relmse) = budget.relmse
+            && frames >= next_look
+        {
+            // An eighth more frames each time: looking costs about a frame, and every look is one more chance to stop by mistake.
+            next_look += next_look / 8;
+            // The error falls at least in proportion to the frames.
+            let share = (relmse / frame_loop.film().estimated_relmse()).min(1.0);
+            done = done.max(share);
+        }
         progress.update(done, frames, pixels);
         each(frame_loop);
         if done >= 1.0 || watch.stopped() {

@@ -1,7 +1,7 @@
 //! The integrators on scenes small enough to know the answer, and against each other.
 
 use super::*;
-use crate::{Image, PixelFilter, metric};
+use crate::{Image, Mis, PixelFilter, metric};
 use glam::Vec3;
 use light_cache::SamplerKind;
 use scene::{Instance, Light, LightKind, LightSource, Material, Mesh, PrimitiveId, SceneParts};
@@ -241,6 +241,33 @@ fn light_hit_by_reflection_and_light_chosen_share_without_loss() {
         (a - b).abs() < 4.0 * error_a.hypot(error_b) + 1e-3 * a,
         "{a} +- {error_a}, {b} +- {error_b}"
     );
+}
+
+/// Whatever shares direct light and spreads samples, the mean is the same: four standard errors allow one failure in 15,000 for each of nine.
+#[test]
+fn every_way_to_share_and_to_spread_agrees() {
+    let scene = box_scene(glossy(), lamp(), &[]);
+    let brightness = |mis: Mis, pixel_sampler: PixelSampler| {
+        let settings = Settings {
+            mis,
+            pixel_sampler,
+            ..settings(UNIFORM, 16, 2)
+        };
+        let frame_loop = rendered(&scene, &settings, 512);
+        (mean(&frame_loop.film().image()), standard_error(frame_loop.film()))
+    };
+    let others = Mis::ALL
+        .map(|mis| (mis, PixelSampler::default()))
+        .into_iter()
+        .chain(PixelSampler::ALL.map(|sampler| (Mis::default(), sampler)));
+    let (a, error_a) = brightness(Mis::default(), PixelSampler::Random);
+    for (mis, sampler) in others {
+        let (b, error_b) = brightness(mis, sampler);
+        assert!(
+            (a - b).abs() < 4.0 * error_a.hypot(error_b),
+            "{mis:?}, {sampler:?}: {a} +- {error_a}, {b} +- {error_b}"
+        );
+    }
 }
 
 #[test]

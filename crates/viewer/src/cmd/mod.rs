@@ -3,5 +3,6 @@
 pub(crate) mod bench;
 pub(crate) mod compare;
 pub(crate) mod dump;
+pub(crate) mod estimate;
 pub(crate) mod info;
 pub(crate) mod render;

@@ -114,6 +114,7 @@ impl Reference {
             let budget = Budget {
                 frames: Some(each),
                 seconds: None,
+                relmse: None,
             };
             let what = format!(
                 "reference of {}, half {half} of 2, kept for next time",

@@ -1,11 +1,12 @@
 //! Results of a scenario as text and files.
 
-use super::super::plot::{self, Axis};
+use super::super::plot::ERROR;
 use super::super::reference::safe_name;
 use super::super::summary::median;
 use super::{LEARNED, Outcome};
 use crate::machine::{self, Machine};
 use crate::output;
+use crate::plot::{Axis, Labels, Line, plot};
 use crate::table::{align, number};
 use anyhow::Result;
 use render::Settings;
@@ -129,20 +130,25 @@ pub(super) fn write_all(folder: &Path, settings: &Settings, outcomes: &[Outcome]
     let text = serde_json::to_string_pretty(&summary)? + "\n";
     output::write(&folder.join("summary.json"), text.as_bytes())?;
     for outcome in outcomes {
-        plot(folder, outcome)?;
+        write_plot(folder, outcome)?;
     }
     Ok(())
 }
 
-fn plot(folder: &Path, outcome: &Outcome) -> Result<()> {
+fn write_plot(folder: &Path, outcome: &Outcome) -> Result<()> {
     let points = |errors: &[f64]| (1..).map(f64::from).zip(errors.iter().copied()).collect();
-    let lines: Vec<plot::Line<'_>> = outcome
+    let lines: Vec<Line<'_>> = outcome
         .curves
         .iter()
         .map(|curve| (curve.sampler, points(&curve.errors)))
         .collect();
     let title = format!("{}, {}: {}", outcome.what, outcome.scenario.name(), outcome.change);
-    if let Some(svg) = plot::plot(&title, "frame", Axis::Linear, &lines)? {
+    let labels = Labels {
+        title: &title,
+        x: "frame",
+        y: ERROR,
+    };
+    if let Some(svg) = plot(labels, Axis::Linear, &lines)? {
         let scene = safe_name(outcome.what.trim_start_matches("demo:"));
         let name = format!("{scene}-{}.svg", outcome.scenario.name());
         output::write(&folder.join(name), svg.as_bytes())?;
