@@ -395,7 +395,7 @@ fn camera_and_scene_may_change() {
         frame_loop.set_camera(&elsewhere);
         assert_eq!(frame_loop.film().spp(), 0);
         frame_loop.render_frame();
-        frame_loop.set_scene(&after).expect("as many lights");
+        frame_loop.set_scene((&after).into()).expect("as many lights");
         (0..512).for_each(|_| frame_loop.render_frame());
         assert_eq!(frame_loop.stats().frames, 512);
         let (found, error) = (mean(&frame_loop.film().image()), standard_error(frame_loop.film()));
@@ -411,7 +411,10 @@ fn camera_and_scene_may_change() {
     }
     let other = box_scene(lambert(0.5), None, &points);
     let mut frame_loop = rendered(&before, &settings(UNIFORM, 16, 0), 1);
-    let message = frame_loop.set_scene(&other).expect_err("fewer lights").to_string();
+    let message = frame_loop
+        .set_scene((&other).into())
+        .expect_err("fewer lights")
+        .to_string();
     assert!(message.contains("3 lights") && message.contains('1'), "{message}");
 }
 
