@@ -82,8 +82,8 @@ pub trait FrameLoop<'s>: Send {
         self.render_frame_unless(&AtomicBool::new(false));
     }
 
-    /// [`FrameLoop::render_frame`], given up as soon as `stop` is set: the image is then empty, and nothing is learned.
-    /// Returns whether the frame was finished.
+    /// [`FrameLoop::render_frame`], given up as soon as `stop` is set: some tiles then have a sample more than others, the
+    /// frame does not count, and nothing is learned. Returns whether the frame was finished.
     fn render_frame_unless(&mut self, stop: &AtomicBool) -> bool;
 
     /// What has been accumulated.
@@ -408,8 +408,6 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
         self.render_s += start.elapsed().as_secs_f64();
         if finished {
             self.film.advance();
-        } else {
-            self.restart();
         }
         finished
     }

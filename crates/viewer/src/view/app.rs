@@ -98,6 +98,8 @@ pub(super) struct App {
     pub(super) pointer: Option<egui::Pos2>,
     pub(super) modifiers: winit::keyboard::ModifiersState,
     capture_to: Vec<PathBuf>,
+    /// Files that the renderer is writing.
+    pub(super) being_written: usize,
     idle: bool,
     egui_repaint_at: Option<Instant>,
     outcome: Result<Status>,
@@ -175,6 +177,7 @@ impl App {
             pointer: None,
             modifiers: Default::default(),
             capture_to: Vec::new(),
+            being_written: 0,
             idle: true,
             egui_repaint_at: None,
             outcome: Ok(Status::Done),
@@ -406,8 +409,11 @@ impl App {
                     lamps::set_importance(&mut stage.lamps, &probabilities);
                 }
             }
-            Event::Renderer(Report::Saved(Ok(path))) => self.say(format!("{} written", path.display())),
-            Event::Renderer(Report::Saved(Err(text)) | Report::Trouble(text)) => self.say(text),
+            Event::Renderer(Report::Saved(result)) => {
+                self.being_written = self.being_written.saturating_sub(1);
+                self.say(result.map_or_else(|text| text, |path| format!("{} written", path.display())));
+            }
+            Event::Renderer(Report::Trouble(text)) => self.say(text),
             Event::Loaded(what, result) => self.enter(what, *result),
         }
         self.request_frame();
@@ -632,7 +638,7 @@ impl App {
     /// Writes the window (PNG, with the next frame) or the picture (EXR).
     pub(super) fn save(&mut self, path: &Path) {
         if path.extension().is_some_and(|extension| extension == "exr") {
-            self.renderer.send(Command::SaveExr(path.into()));
+            self.being_written += usize::from(self.renderer.send(Command::SaveExr(path.into())));
         } else {
             self.capture_to.push(path.into());
         }

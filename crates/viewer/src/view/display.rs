@@ -142,7 +142,6 @@ impl Display {
     /// Gives up the device, as a driver that fails does: for tests.
     pub(super) fn lose(&self) {
         self.device.destroy();
-        self.lost.store(true, Ordering::Relaxed);
     }
 
     /// The window has another size; 0 is taken as minimised.
@@ -162,6 +161,12 @@ impl Display {
 
     /// Draws the frame, top to bottom, and reads it back if asked for. A surface that is not ready is tried again at the next frame.
     pub(super) fn draw(&mut self, panels: &Panels, exposure: f32, capture: bool) -> Option<Capture> {
+        // Tells whether the device is still there: what the panels need cannot be had from one that is not.
+        let polled = self.device.poll(wgpu::PollType::Poll);
+        if polled.is_err() || self.is_lost() {
+            self.lost.store(true, Ordering::Relaxed);
+            return None;
+        }
         for (id, delta) in panels
             .textures
             .set

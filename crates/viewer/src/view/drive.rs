@@ -42,6 +42,9 @@ struct Report {
     width: u32,
     height: u32,
     adapter: String,
+    /// Stops.
+    exposure: f32,
+    spp: u64,
     window_frame_ms: Option<Summary>,
     render_frame_ms: Option<Summary>,
     input_to_picture_ms: Option<Summary>,
@@ -114,6 +117,10 @@ impl App {
 
     /// Does one step; false if it has to go on in the next frame.
     fn perform(&mut self, event_loop: &ActiveEventLoop, step: &Step) -> bool {
+        // A file is complete before anything else happens.
+        if self.being_written > 0 {
+            return false;
+        }
         match step {
             Step::Camera(eye, target) => {
                 let fov_y = self.fly.camera().fov_y;
@@ -263,6 +270,8 @@ impl App {
                 .as_ref()
                 .map(|display| display.adapter().to_owned())
                 .unwrap_or_default(),
+            exposure: self.exposure.now,
+            spp: self.figures.spp,
             window_frame_ms: self.times.window.summary(),
             render_frame_ms: self.times.render.summary(),
             input_to_picture_ms: self.times.latency.summary(),

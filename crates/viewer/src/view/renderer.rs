@@ -56,12 +56,9 @@ pub(super) enum Command {
 }
 
 impl Command {
-    /// Whether what is being rendered is worthless now.
+    /// Whether it is not to wait until a frame in full size has ended.
     fn is_urgent(&self) -> bool {
-        !matches!(
-            self,
-            Self::Budget(_) | Self::Importance(_) | Self::Inspect(_) | Self::SaveExr(_)
-        )
+        !matches!(self, Self::Budget(_) | Self::Importance(_) | Self::SaveExr(_))
     }
 }
 
@@ -213,7 +210,10 @@ struct Stage {
     input: Option<Instant>,
     published: Option<Instant>,
     importance_told: Option<Instant>,
+    /// Rays traced until the last picture.
     rays: u64,
+    /// What the last frames took.
+    seconds: f64,
 }
 
 impl Worker {
@@ -295,6 +295,10 @@ impl Worker {
             }
             Command::Pause(paused) => {
                 self.paused = paused;
+                // What has been rendered since the last picture is shown too.
+                if paused && self.stage.as_ref().is_some_and(|stage| stage.frames.film().spp() > 0) {
+                    self.publish();
+                }
                 Ok(())
             }
             Command::Inspect(at) => {
@@ -341,6 +345,7 @@ impl Worker {
             published: None,
             importance_told: None,
             rays: 0,
+            seconds: 0.0,
         });
         Ok(())
     }
@@ -441,19 +446,21 @@ impl Worker {
         }
         let seconds = start.elapsed().as_secs_f64();
         self.resolution.measured(pixels * u64::from(count), seconds * 1e3);
+        stage.seconds = seconds;
 
         let due = stage.published.is_none_or(|at| at.elapsed() >= BETWEEN_REFINEMENTS);
         if due || !still || stage.frames.film().spp() <= 2 {
-            self.publish(still, seconds);
+            self.publish();
         }
         self.tell_importance();
     }
 
     /// Hands the picture over.
-    fn publish(&mut self, still: bool, seconds: f64) {
+    fn publish(&mut self) {
         let Some(stage) = &mut self.stage else { return };
         let film = stage.frames.film();
         let (width, height) = (film.width(), film.height());
+        let still = (width, height) == self.window && stage.changed.elapsed() >= REST;
         let shown = self.view.of(film);
         let stats = stage.frames.stats();
         let rays = stats.rays_nearest + stats.rays_occluded;
@@ -468,9 +475,9 @@ impl Worker {
                 still,
                 view: self.view,
                 size: (width, height),
-                frame_ms: seconds * 1e3,
+                frame_ms: stage.seconds * 1e3,
                 rays_per_s: (rays - stage.rays) as f64
-                    / stage.published.map_or(seconds, |at| at.elapsed().as_secs_f64()),
+                    / stage.published.map_or(stage.seconds, |at| at.elapsed().as_secs_f64()),
                 cells: sampler.cells,
                 sampler_bytes: sampler.bytes,
                 input: stage.input.take(),

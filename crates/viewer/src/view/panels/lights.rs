@@ -73,7 +73,9 @@ fn order(stage: &Stage, filter: &str) -> Vec<usize> {
 fn row(ui: &mut egui::Ui, index: usize, stage: &Stage, most: f64, actions: &mut Vec<Action>) {
     let lamp = &stage.lamps[index];
     ui.horizontal(|ui| {
-        ui.set_height(ROW - ui.spacing().item_spacing.y);
+        ui.set_height(ROW);
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.spacing_mut().button_padding = egui::vec2(4.0, 1.0);
         let mut on = lamp.is_on();
         if ui.checkbox(&mut on, "").on_hover_text("on, off").changed() {
             actions.push(Action::Relight(index, if on { Vec3::ONE } else { Vec3::ZERO }));
@@ -82,8 +84,13 @@ fn row(ui: &mut egui::Ui, index: usize, stage: &Stage, most: f64, actions: &mut 
         let selected = stage.selected == Some(index);
         let name = if lamp.name.is_empty() { "(no name)" } else { &lamp.name };
         let label = egui::Button::selectable(selected, name).truncate();
-        let width = (ui.available_width() - 110.0).max(40.0);
-        if ui.add_sized([width, ROW - 4.0], label).clicked() {
+        let width = (ui.available_width() - 104.0).max(40.0);
+        let left = egui::Layout::left_to_right(egui::Align::Center);
+        let clicked = ui.allocate_ui_with_layout(egui::vec2(width, ROW), left, |ui| {
+            ui.set_width(width);
+            ui.add(label).clicked()
+        });
+        if clicked.inner {
             actions.push(Action::Select((!selected).then_some(index)));
         }
         let share = lamp.importance.unwrap_or(0.0);

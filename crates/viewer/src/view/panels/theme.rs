@@ -3,7 +3,7 @@
 use egui::{Color32, CornerRadius, Frame, Margin, RichText, Stroke};
 
 /// Width of the panel at the right edge, points.
-pub(super) const SIDE_WIDTH: f32 = 318.0;
+pub(super) const SIDE_WIDTH: f32 = 330.0;
 /// Distance of cards from the edges of the window, points.
 pub(super) const MARGIN: f32 = 12.0;
 /// What is selected or active.
