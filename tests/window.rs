@@ -130,7 +130,7 @@ fn the_window_shows_what_was_rendered_through_the_tone_curve_of_png_files() {
     let Some(display) = Display::start() else { return };
     let temporary = tempfile::tempdir().expect("a temporary folder");
     let folder = temporary.path();
-    let script = "0 settle 8\n0 key f2\n0 key x\n1 key space\n40 screenshot linear.exr\n40 screenshot seen.png\n\
+    let script = "0 key n\n0 settle 8\n0 key f2\n0 key x\n1 key space\n40 screenshot linear.exr\n40 screenshot seen.png\n\
                   45 report report.json\n60 quit\n";
     let Some(output) = display.view(folder, "demo:rooms:64", script) else {
         return;

@@ -35,6 +35,8 @@ pub(super) enum Action {
     Budget(f64),
     /// So many stops more.
     Expose(f32),
+    /// Takes the noise away, or shows it.
+    Denoise,
     /// Switches automatic exposure.
     AutoExposure,
     /// Stops rendering or goes on.
@@ -116,6 +118,7 @@ pub(super) const HELP: [(&str, &[Line]); 4] = [
         &[
             line("0  1 ... 5", "image, debug views"),
             line("T", "next sampler"),
+            line("N", "noise as it is, or taken away"),
             line(",  .", "darker, brighter"),
             line("X", "exposure by itself, or fixed"),
             line("Space", "pause rendering"),
@@ -196,6 +199,7 @@ pub(super) fn action_of(key: KeyCode, with: With, down: bool) -> Option<Action> 
         (KeyCode::KeyT, _) => Action::NextSampler,
         (KeyCode::Comma, _) => Action::Expose(-0.5),
         (KeyCode::Period, _) => Action::Expose(0.5),
+        (KeyCode::KeyN, _) => Action::Denoise,
         (KeyCode::KeyX, _) => Action::AutoExposure,
         (KeyCode::KeyK, _) => Action::Record,
         (KeyCode::KeyP, _) => Action::Play,
@@ -224,7 +228,7 @@ fn digit(key: KeyCode) -> Option<usize> {
 }
 
 /// The keys that do anything, by the names that scripts use.
-pub(super) const KEY_NAMES: [(&str, KeyCode); 39] = [
+pub(super) const KEY_NAMES: [(&str, KeyCode); 40] = [
     ("w", KeyCode::KeyW),
     ("a", KeyCode::KeyA),
     ("s", KeyCode::KeyS),
@@ -256,6 +260,7 @@ pub(super) const KEY_NAMES: [(&str, KeyCode); 39] = [
     ("comma", KeyCode::Comma),
     ("period", KeyCode::Period),
     ("x", KeyCode::KeyX),
+    ("n", KeyCode::KeyN),
     ("k", KeyCode::KeyK),
     ("p", KeyCode::KeyP),
     ("c", KeyCode::KeyC),

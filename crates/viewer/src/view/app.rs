@@ -90,6 +90,8 @@ pub(super) struct App {
     pub(super) panels: PanelState,
     pub(super) messages: Vec<(Instant, String)>,
     pub(super) paused: bool,
+    /// The noise is taken away, for the eyes only.
+    pub(super) denoise: bool,
     pub(super) driver: Driver,
     pub(super) bookmarks: BTreeMap<usize, Camera>,
     /// What is kept for the next run; `None` if nothing is.
@@ -170,6 +172,7 @@ impl App {
             },
             messages: Vec::new(),
             paused: false,
+            denoise: true,
             driver: Driver::new(script),
             bookmarks: BTreeMap::new(),
             remembered,
@@ -528,6 +531,10 @@ impl App {
                 if !self.exposure.automatic {
                     self.exposure.now += stops;
                 }
+            }
+            Action::Denoise => {
+                self.denoise = !self.denoise;
+                self.renderer.send(Command::Denoise(self.denoise));
             }
             Action::AutoExposure => {
                 self.exposure.automatic = !self.exposure.automatic;

@@ -6,6 +6,7 @@
 mod actions;
 mod app;
 mod camera_control;
+mod denoise;
 mod display;
 mod drive;
 mod events;
@@ -54,6 +55,9 @@ pub(crate) struct ViewArgs {
     /// Higher values give sharper pictures; lower values give more of them.
     #[arg(long, value_name = "MS", default_value_t = 30.0, value_parser = milliseconds)]
     frame_time: f64,
+    /// Camera path that P plays: what K has recorded, one camera a frame
+    #[arg(long, value_name = "FILE")]
+    camera_path: Option<PathBuf>,
     /// Drive the window by a script
     #[arg(long, value_name = "FILE")]
     script: Option<PathBuf>,
@@ -88,6 +92,7 @@ fn milliseconds(text: &str) -> Result<f64, String> {
 /// Bad input; [`Refusal::NoGpu`] if there is no display or nothing to draw to it with.
 pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
     let script = args.script.as_deref().map(Script::read).transpose()?;
+    let path = args.camera_path.as_deref().map(settings_file::read_path).transpose()?;
     let settings = args.light.settings(args.sampler, (1, 1))?;
     settings.check()?;
     session::use_threads(args.light.threads)?;
@@ -97,6 +102,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
         ))
     })?;
     let mut app = App::new(args, settings, script, event_loop.create_proxy())?;
+    app.driver.path = path.unwrap_or_default();
     event_loop.run_app(&mut app)?;
     app.outcome()
 }

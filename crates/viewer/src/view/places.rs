@@ -1,9 +1,10 @@
 //! Bookmarks, camera paths, and the camera as text.
 
 use super::app::App;
-use super::settings_file::{Pose, Remembered};
+use super::settings_file::{self, Pose, Remembered};
 use crate::message;
 use scene::Camera;
+use std::path::PathBuf;
 
 impl App {
     /// A scene is about to be shown: its bookmarks are taken up, and it heads the list of scenes.
@@ -69,7 +70,13 @@ impl App {
                 self.say("recording the camera's path; K ends it");
             }
             Some(path) => {
-                self.say(format!("{} frames recorded; P plays them", path.len()));
+                let name = |number: u32| PathBuf::from(format!("manylight-path-{number:04}.json"));
+                let free = (1..).map(name).find(|name| !name.exists()).unwrap_or_default();
+                let written = settings_file::write_path(&free, &path);
+                self.say(match written {
+                    Ok(()) => format!("{}: {} frames; P plays them", free.display(), path.len()),
+                    Err(error) => format!("P plays {} frames, but they are not kept: {error:#}", path.len()),
+                });
                 self.driver.path = path;
             }
         }

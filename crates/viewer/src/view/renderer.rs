@@ -3,6 +3,7 @@
 //! While the camera moves, frames are small enough to keep the frame time; once it rests the picture is rendered in full
 //! and refined. A command that makes the picture worthless stops a frame in full size at once.
 
+use super::denoise;
 use super::inspector::{self, Inspection};
 use super::resolution::Resolution;
 use super::views::{Shown, View};
@@ -25,6 +26,8 @@ const REST: Duration = Duration::from_millis(150);
 const BETWEEN_REFINEMENTS: Duration = Duration::from_millis(120);
 /// A picture of so many samples per pixel is finished.
 const FINISHED_SPP: u64 = 1 << 16;
+/// From so many samples per pixel on the picture is shown as it is.
+const CLEAN_SPP: u64 = 128;
 /// Least time between two reports of what lights matter.
 const BETWEEN_IMPORTANCES: Duration = Duration::from_millis(500);
 
@@ -43,6 +46,8 @@ pub(super) enum Command {
     Show(View),
     /// Milliseconds for a frame while the picture moves.
     Budget(f64),
+    /// Whether noise is taken away, for the eyes only.
+    Denoise(bool),
     /// Lights that shine by a factor of what the scene says; all others as it says.
     Relight(Vec<(u32, Vec3)>),
     /// Whether the probabilities of all lights are wanted.
@@ -133,6 +138,7 @@ impl Renderer {
             tell: Box::new(tell),
             settings,
             view: View::Image,
+            denoise: true,
             window: (0, 0),
             paused: false,
             wants_importance: false,
@@ -189,6 +195,7 @@ struct Worker {
     tell: Box<dyn Fn(Report) + Send>,
     settings: Settings,
     view: View,
+    denoise: bool,
     window: (u32, u32),
     paused: bool,
     wants_importance: bool,
@@ -283,7 +290,8 @@ impl Worker {
                     self.begin_anew()
                 }
             }
-            Command::Show(view) => self.show(view),
+            Command::Show(view) => self.show(view, self.denoise),
+            Command::Denoise(denoise) => self.show(self.view, denoise),
             Command::Budget(milliseconds) => {
                 self.resolution.set_budget(milliseconds);
                 Ok(())
@@ -331,7 +339,7 @@ impl Worker {
         let settings = Settings {
             width,
             height,
-            aovs: self.view.needs_aovs(),
+            aovs: self.needs_aovs(),
             ..self.settings.clone()
         };
         let frames = session::start(scene.clone(), &camera, &settings)?;
@@ -368,9 +376,15 @@ impl Worker {
         }
     }
 
-    fn show(&mut self, view: View) -> anyhow::Result<()> {
-        let (before, now) = (self.view.needs_aovs(), view.needs_aovs());
-        self.view = view;
+    /// Whether the film must keep auxiliary images.
+    fn needs_aovs(&self) -> bool {
+        self.view.needs_aovs() || (self.denoise && self.view == View::Image)
+    }
+
+    fn show(&mut self, view: View, denoise: bool) -> anyhow::Result<()> {
+        let before = self.needs_aovs();
+        (self.view, self.denoise) = (view, denoise);
+        let now = self.needs_aovs();
         let Some(stage) = &mut self.stage else { return Ok(()) };
         stage.published = None;
         if before != now {
@@ -420,11 +434,12 @@ impl Worker {
     fn render(&mut self) {
         let still = self.stage.as_ref().is_some_and(|stage| stage.changed.elapsed() >= REST);
         let size = self.stage.as_ref().and_then(|stage| self.size(stage));
+        let aovs = self.needs_aovs();
         // Keeps the scale that it has decided on.
         self.resolution.moving_size(self.window);
         let Some(stage) = &mut self.stage else { return };
         if let Some((width, height)) = size
-            && let Err(error) = stage.frames.set_film(width, height, self.view.needs_aovs())
+            && let Err(error) = stage.frames.set_film(width, height, aovs)
         {
             (self.tell)(Report::Trouble(error.to_string()));
             self.paused = true;
@@ -445,13 +460,15 @@ impl Worker {
             }
         }
         let seconds = start.elapsed().as_secs_f64();
-        self.resolution.measured(pixels * u64::from(count), seconds * 1e3);
         stage.seconds = seconds;
 
         let due = stage.published.is_none_or(|at| at.elapsed() >= BETWEEN_REFINEMENTS);
         if due || !still || stage.frames.film().spp() <= 2 {
             self.publish();
         }
+        // What is done to the picture for the eyes counts while it moves: then it is done for every frame.
+        let seconds = if still { seconds } else { start.elapsed().as_secs_f64() };
+        self.resolution.measured(pixels * u64::from(count), seconds * 1e3);
         self.tell_importance();
     }
 
@@ -461,7 +478,11 @@ impl Worker {
         let film = stage.frames.film();
         let (width, height) = (film.width(), film.height());
         let still = (width, height) == self.window && stage.changed.elapsed() >= REST;
-        let shown = self.view.of(film);
+        let shown = if self.view == View::Image && self.denoise && film.spp() < CLEAN_SPP {
+            Shown::image(&denoise::denoised(film))
+        } else {
+            self.view.of(film)
+        };
         let stats = stage.frames.stats();
         let rays = stats.rays_nearest + stats.rays_occluded;
         let sampler = stats.sampler.unwrap_or_default();

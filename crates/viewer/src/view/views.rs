@@ -30,6 +30,17 @@ pub(super) struct Shown {
     pub(super) legend: String,
 }
 
+impl Shown {
+    /// Radiance, to go through the tone curve.
+    pub(super) fn image(pixels: &[Vec3]) -> Self {
+        Self {
+            texels: pixels.par_iter().map(|pixel| pixel.extend(1.0).to_array()).collect(),
+            tone_mapped: true,
+            legend: String::new(),
+        }
+    }
+}
+
 impl View {
     pub(super) const ALL: [Self; 6] = [
         Self::Image,

@@ -2,6 +2,7 @@
 
 use super::super::app::App;
 use super::super::frame_times::Recent;
+use super::super::views::View;
 use super::theme;
 use crate::{machine, table};
 use egui::{Align2, Area, Id, Sense, Stroke, vec2};
@@ -34,7 +35,12 @@ fn figures(ui: &mut egui::Ui, app: &App) {
         (_, true) => "refining",
         (_, false) => "moving",
     };
-    ui.label(theme::faint(format!("{}, {state}", app.settings.method.name())));
+    let noise = if app.denoise && app.view == View::Image {
+        ", denoised"
+    } else {
+        ""
+    };
+    ui.label(theme::faint(format!("{}, {state}{noise}", app.settings.method.name())));
 
     ui.add_space(3.0);
     if let Some(times) = app.times.render.summary() {

@@ -56,6 +56,13 @@ pub(super) fn show(ui: &mut egui::Ui, app: &mut App, actions: &mut Vec<Action>) 
     ) {
         actions.push(Action::Expose(stops - before));
     }
+    let mut denoise = app.denoise;
+    if ui
+        .checkbox(&mut denoise, "noise taken away, for the eyes only")
+        .changed()
+    {
+        actions.push(Action::Denoise);
+    }
     if ui.checkbox(&mut automatic, "exposure follows the picture").changed() {
         actions.push(Action::AutoExposure);
     }
