@@ -14,7 +14,7 @@ use super::script::Script;
 use super::settings_file::Remembered;
 use super::views::View;
 use crate::exit::{Refusal, Status};
-use crate::session;
+use crate::{message, session};
 use anyhow::Result;
 use glam::Vec3;
 use render::{Method, Settings};
@@ -248,6 +248,10 @@ impl App {
 
     /// A message for people; it goes away by itself.
     pub(super) fn say(&mut self, text: impl Into<String>) {
+        // Nobody looks on, and what a script captures is not to have traces of what it captured before.
+        if self.driver.scripted {
+            return message::note(text.into());
+        }
         self.messages.push((Instant::now(), text.into()));
     }
 

@@ -23,6 +23,8 @@ const INPUTS_PER_FRAME: u32 = 25;
 #[derive(Debug, Default)]
 pub(super) struct Driver {
     script: Option<Script>,
+    /// Driven by a script, from beginning to end.
+    pub(super) scripted: bool,
     /// The script waits for a picture: no need to hurry.
     waits: bool,
     /// Keys that the script holds, with the frames that are left.
@@ -53,6 +55,7 @@ struct Report {
 impl Driver {
     pub(super) fn new(script: Option<Script>) -> Self {
         Self {
+            scripted: script.is_some(),
             script,
             ..Self::default()
         }

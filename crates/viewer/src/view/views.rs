@@ -70,7 +70,7 @@ impl View {
             Self::Albedo => "diffuse albedo plus specular reflectance",
             Self::Normal => "shading normal, world space",
             Self::Depth => "distance from the camera",
-            Self::Light => "light chosen by the last sample, one colour each",
+            Self::Light => "light chosen by the last sample",
             Self::Error => "standard error of the pixel / its value",
         }
     }
