@@ -20,7 +20,12 @@ pub(super) fn help(context: &egui::Context, app: &mut App, actions: &mut Vec<Act
     let window = Window::new("Keys")
         .open(&mut open)
         .anchor(Align2::CENTER_CENTER, vec2(0.0, 0.0));
-    window.resizable(false).collapsible(false).show(context, |ui| {
+    let window = window
+        .resizable(false)
+        .collapsible(false)
+        .scroll(true)
+        .default_size(vec2(630.0, 530.0));
+    window.show(context, |ui| {
         ui.horizontal_top(|ui| {
             for half in HELP.chunks(2) {
                 ui.vertical(|ui| {

@@ -51,13 +51,17 @@ pub(super) fn show(ui: &mut egui::Ui, app: &mut App, actions: &mut Vec<Action>) 
     let context = ui.ctx().clone();
     inspected::markers(&context, app);
     if !app.panels.hidden {
-        if app.panels.settings || app.panels.lights {
+        let side_open = app.panels.settings || app.panels.lights;
+        if side_open {
             side(ui, app, actions);
         }
-        if app.panels.overlay {
-            overlay::show(&context, app);
+        // In a narrow window what was opened last is what matters.
+        if !side_open || context.content_rect().width() >= theme::ROOM_FOR_SIDE {
+            if app.panels.overlay {
+                overlay::show(&context, app);
+            }
+            inspected::card(&context, app);
         }
-        inspected::card(&context, app);
         notes::legend(&context, app);
         notes::messages(&context, app);
         dialogs::help(&context, app, actions);

@@ -4,6 +4,8 @@ use egui::{Color32, CornerRadius, Frame, Margin, RichText, Stroke};
 
 /// Width of the panel at the right edge, points.
 pub(super) const SIDE_WIDTH: f32 = 330.0;
+/// Width of a window in which cards find room beside that panel, points.
+pub(super) const ROOM_FOR_SIDE: f32 = 640.0;
 /// Distance of cards from the edges of the window, points.
 pub(super) const MARGIN: f32 = 12.0;
 /// What is selected or active.
