@@ -208,7 +208,7 @@ fn bad_usage_is_refused_and_says_what_is_valid() {
     refused(folder, &["dump", demo, "-o", "lights.txt"], &["lights.txt", ".parquet"]);
     refused(folder, &["info", demo, "--export", "no/scene.glb"], &["no/scene.glb"]);
     refused(folder, &["rendr", demo], &["render"]);
-    refused(folder, &[demo], &["manylight render"]);
+    refused(folder, &["view", demo, "--frame-time", "0"], &["frame-time"]);
 }
 
 #[test]

@@ -10,3 +10,5 @@ mod properties;
 mod scale;
 /// Every sampler against `exact`.
 mod unbiased;
+/// The window, driven by scripts.
+mod window;

@@ -54,7 +54,7 @@ pub(crate) fn measure<D: DirectLight>(eye: &Eye<'_>, direct: &D) -> Choosing {
     for _ in 0..ROUNDS {
         let start = Instant::now();
         for (point, u) in timed.clone() {
-            black_box(direct.choose(eye.scene, black_box(point), *u));
+            black_box(direct.choose(&eye.scene, black_box(point), *u));
         }
         fastest = fastest.min(start.elapsed().as_secs_f64());
     }

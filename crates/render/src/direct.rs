@@ -77,6 +77,9 @@ pub(crate) trait DirectLight: Sync + Send {
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
 
+    /// See [`LightSampler::add_pmfs`]; nothing where no choice is made.
+    fn add_pmfs(&self, _local: &Self::Local<'_>, _sum: &mut [f64]) {}
+
     /// See [`LightSampler::pace`].
     fn pace(&self) -> Pace {
         Pace::STEADY
@@ -177,6 +180,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
     #[inline]
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32 {
         self.0.pmf(local, light)
+    }
+
+    fn add_pmfs(&self, local: &Self::Local<'_>, sum: &mut [f64]) {
+        self.0.add_pmfs(local, sum);
     }
 
     fn pace(&self) -> Pace {

@@ -26,7 +26,7 @@ pub struct Image {
     pub pixels: Vec<[f32; 3]>,
 }
 
-/// Auxiliary images. Albedo and normal are means over all samples (zero where nothing was hit); position and depth are
+/// Auxiliary images. Albedo, normal and emission are means over all samples (zero where nothing was hit); position and depth are
 /// means over the samples that hit something; the chosen light is that of the last sample, unfiltered.
 #[derive(Clone, Debug)]
 pub struct Aovs {
@@ -36,6 +36,8 @@ pub struct Aovs {
     pub normal: Image,
     /// World position, metres; zero where nothing was hit.
     pub position: Image,
+    /// Radiance that the first surface emits itself.
+    pub emitted: Image,
     /// Distance from the camera, metres; infinite where nothing was hit.
     pub depth: Vec<f32>,
     /// Index of the light chosen at the first hit by the last sample; -1 for none.
@@ -48,6 +50,7 @@ pub(crate) struct AovSample {
     pub(crate) albedo: Vec3,
     pub(crate) normal_ws: Vec3,
     pub(crate) position_ws: Vec3,
+    pub(crate) emitted: Vec3,
     /// Metres; infinite if nothing was hit.
     pub(crate) depth: f32,
     /// -1 for none.
@@ -60,6 +63,7 @@ impl AovSample {
         albedo: Vec3::ZERO,
         normal_ws: Vec3::ZERO,
         position_ws: Vec3::ZERO,
+        emitted: Vec3::ZERO,
         depth: f32::INFINITY,
         light: -1,
     };
@@ -76,10 +80,10 @@ struct PixelRecord {
     weight: f64,
 }
 
-/// Auxiliary sums of one pixel: albedo, normal, position, depth.
+/// Auxiliary sums of one pixel: albedo, normal, position, emission, depth.
 #[derive(Clone, Copy, Debug)]
 struct AovRecord {
-    sums: [f64; 10],
+    sums: [f64; 13],
     count: u32,
     hits: u32,
     light: i64,
@@ -87,7 +91,7 @@ struct AovRecord {
 
 impl AovRecord {
     const EMPTY: Self = Self {
-        sums: [0.0; 10],
+        sums: [0.0; 13],
         count: 0,
         hits: 0,
         light: -1,
@@ -137,11 +141,11 @@ impl Tile {
         pixel.light = sample.light;
         if sample.depth.is_finite() {
             pixel.hits += 1;
-            let values = [sample.albedo, sample.normal_ws, sample.position_ws];
+            let values = [sample.albedo, sample.normal_ws, sample.position_ws, sample.emitted];
             for (sum, value) in pixel.sums.iter_mut().zip(values.iter().flat_map(|v| v.to_array())) {
                 *sum += f64::from(value);
             }
-            pixel.sums[9] += f64::from(sample.depth);
+            pixel.sums[12] += f64::from(sample.depth);
         }
     }
 }
@@ -295,11 +299,12 @@ impl Film {
             albedo: mean(0, false),
             normal: mean(3, false),
             position: mean(6, true),
+            emitted: mean(9, false),
             depth: self.to_rows(0.0, |tile, i| {
                 let pixel = &tile.aovs[i];
                 match pixel.hits {
                     0 => f32::INFINITY,
-                    hits => (pixel.sums[9] / f64::from(hits)) as f32,
+                    hits => (pixel.sums[12] / f64::from(hits)) as f32,
                 }
             }),
             light: self.to_rows(0.0, |tile, i| tile.aovs[i].light as f32),
@@ -455,6 +460,7 @@ mod tests {
             albedo: Vec3::splat(0.5),
             normal_ws: Vec3::Z,
             position_ws: Vec3::new(1.0, 2.0, 3.0),
+            emitted: Vec3::splat(6.0),
             depth: 4.0,
             light: 7,
         };
@@ -466,6 +472,7 @@ mod tests {
         assert_eq!(aovs.albedo.pixels[0], [0.25; 3]);
         assert_eq!(aovs.normal.pixels[0], [0.0, 0.0, 0.5]);
         assert_eq!(aovs.position.pixels[0], [1.0, 2.0, 3.0]);
+        assert_eq!(aovs.emitted.pixels, vec![[3.0; 3], [0.0; 3]]);
         assert_eq!(aovs.depth, vec![4.0, f32::INFINITY]);
         assert_eq!(aovs.light, vec![-1.0, -1.0]);
     }

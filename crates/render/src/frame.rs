@@ -6,14 +6,17 @@ use crate::exact::AllLights;
 use crate::filter::FilterSampler;
 use crate::oracle::Oracle;
 use crate::path::{Counters, FrameView, TileLog, render_tile};
+use crate::settings;
 use crate::{Film, Method, RenderError, Settings};
-use light_cache::{CellRecord, LightRecord, LightSampler, Observation, Recording, SamplerStats, Visitor};
+use light_cache::{CellRecord, LightRecord, LightSampler, Observation, Recording, SamplerStats, ShadingPoint, Visitor};
 use rayon::prelude::*;
 use sampling::PixelSampler;
 use sampling::mis::Heuristic;
 use scene::camera::CameraRays;
 use scene::{Camera, Scene};
-use std::ops::Add;
+use std::ops::{Add, Deref};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// Counters of a rendering.
@@ -39,12 +42,51 @@ pub struct RenderStats {
     pub skipped: Vec<String>,
 }
 
+/// The scene of a rendering: it outlives the rendering, or is shared with it, so that a long walk can go from one state
+/// of a scene to the next without keeping them all.
+#[derive(Clone, Debug)]
+pub enum SceneRef<'s> {
+    /// Somebody else's.
+    Borrowed(&'s Scene),
+    /// Kept as long as anyone needs it.
+    Shared(Arc<Scene>),
+}
+
+impl Deref for SceneRef<'_> {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        match self {
+            Self::Borrowed(scene) => scene,
+            Self::Shared(scene) => scene,
+        }
+    }
+}
+
+impl<'s> From<&'s Scene> for SceneRef<'s> {
+    fn from(scene: &'s Scene) -> Self {
+        Self::Borrowed(scene)
+    }
+}
+
+impl From<Arc<Scene>> for SceneRef<'_> {
+    fn from(scene: Arc<Scene>) -> Self {
+        Self::Shared(scene)
+    }
+}
+
 /// A rendering in progress, of scenes that live as long as `'s`.
 ///
-/// Camera and scene may change between frames: the image then starts anew, and the sampler keeps what it has learned.
+/// Camera, size and scene may change between frames: the image then starts anew, and the sampler keeps what it has learned.
 pub trait FrameLoop<'s>: Send {
     /// Renders one frame, one sample per pixel, on rayon's current thread pool, and lets the sampler learn from it.
-    fn render_frame(&mut self);
+    fn render_frame(&mut self) {
+        self.render_frame_unless(&AtomicBool::new(false));
+    }
+
+    /// [`FrameLoop::render_frame`], given up as soon as `stop` is set: some tiles then have a sample more than others, the
+    /// frame does not count, and nothing is learned. Returns whether the frame was finished.
+    fn render_frame_unless(&mut self, stop: &AtomicBool) -> bool;
 
     /// What has been accumulated.
     fn film(&self) -> &Film;
@@ -55,12 +97,18 @@ pub trait FrameLoop<'s>: Send {
     /// Looks through another camera from now on.
     fn set_camera(&mut self, camera: &Camera);
 
+    /// Makes images of another size from now on, 1..=32,768 pixels each way, with auxiliary images or without.
+    ///
+    /// # Errors
+    /// [`RenderError::Setting`] for a size out of range.
+    fn set_film(&mut self, width: u32, height: u32, aovs: bool) -> Result<(), RenderError>;
+
     /// Goes on with another state of the scene: the same lights in the same order, some of which may shine otherwise, and
     /// any geometry.
     ///
     /// # Errors
     /// [`RenderError::Setting`] if there are more or fewer lights.
-    fn set_scene(&mut self, scene: &'s Scene) -> Result<(), RenderError>;
+    fn set_scene(&mut self, scene: SceneRef<'s>) -> Result<(), RenderError>;
 
     /// Counters so far.
     fn stats(&self) -> RenderStats;
@@ -72,6 +120,9 @@ pub trait FrameLoop<'s>: Send {
     /// What the sampler has learned about each cell; empty for samplers without cells.
     fn cells(&self) -> Vec<CellRecord>;
 
+    /// The probability with which each light is drawn now, mean over `points`; empty for methods without a sampler.
+    fn light_probabilities(&self, points: &[ShadingPoint]) -> Vec<f64>;
+
     /// Measures what the choice of lights costs, by making all choices of one frame again and nothing else; `None` for
     /// methods without a sampler.
     fn choosing(&self) -> Option<Choosing>;
@@ -82,11 +133,12 @@ pub trait FrameLoop<'s>: Send {
 /// # Errors
 /// [`RenderError::Setting`] for a setting out of range.
 pub fn renderer<'s>(
-    scene: &'s Scene,
+    scene: impl Into<SceneRef<'s>>,
     camera: &Camera,
     settings: &Settings,
 ) -> Result<Box<dyn FrameLoop<'s> + 's>, RenderError> {
     settings.check()?;
+    let scene = scene.into();
     let start = Instant::now();
     Ok(match settings.method {
         Method::Exact => {
@@ -94,23 +146,21 @@ pub fn renderer<'s>(
             Box::new(Rendering::new(scene, camera, settings, frames, start))
         }
         Method::Oracle => Box::new(Rendering::new(scene, camera, settings, Oracle::new(settings), start)),
-        Method::Sampled(kind) => light_cache::build(
-            scene,
-            &settings.light,
-            kind,
-            Starter {
-                scene,
+        Method::Sampled(kind) => {
+            let starter = Starter {
+                scene: scene.clone(),
                 camera,
                 settings,
                 start,
-            },
-        ),
+            };
+            light_cache::build(&scene, &settings.light, kind, starter)
+        }
     })
 }
 
 /// Starts a rendering with whatever sampler was built.
 struct Starter<'s, 'a> {
-    scene: &'s Scene,
+    scene: SceneRef<'s>,
     camera: &'a Camera,
     settings: &'a Settings,
     start: Instant,
@@ -127,7 +177,7 @@ impl<'s> Visitor for Starter<'s, '_> {
             start,
         } = self;
         if settings.record_lights {
-            let recording = Recording::new(sampler, scene, settings.light.table_decay);
+            let recording = Recording::new(sampler, &scene, settings.light.table_decay);
             let frames = Drawn::new(OneLight(recording));
             Box::new(Rendering::new(scene, camera, settings, frames, start))
         } else {
@@ -140,7 +190,7 @@ impl<'s> Visitor for Starter<'s, '_> {
 /// What frames look at, and with which random numbers.
 #[derive(Clone, Debug)]
 pub(crate) struct Eye<'s> {
-    pub(crate) scene: &'s Scene,
+    pub(crate) scene: SceneRef<'s>,
     pub(crate) camera: CameraRays,
     pub(crate) filter: FilterSampler,
     pub(crate) image_width: u32,
@@ -160,7 +210,7 @@ pub(crate) struct Eye<'s> {
 impl Eye<'_> {
     pub(crate) fn view<'f, D>(&'f self, direct: &'f D) -> FrameView<'f, D> {
         FrameView {
-            scene: self.scene,
+            scene: &self.scene,
             direct,
             camera: self.camera,
             filter: &self.filter,
@@ -182,8 +232,9 @@ pub(crate) trait Frames: Send {
     /// Called before the first frame, and when camera or scene have changed. `film` is empty.
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film);
 
-    /// Adds one sample to every pixel. With `AOVS` to the auxiliary images too.
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters;
+    /// Adds one sample to every pixel. With `AOVS` to the auxiliary images too. Once `stop` is set it does nothing more,
+    /// learns nothing, and returns false.
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool);
 
     /// Called when the scene has changed, before [`Frames::look`].
     fn scene_changed(&mut self, scene: &Scene);
@@ -199,6 +250,9 @@ pub(crate) trait Frames: Send {
 
     /// See [`FrameLoop::cells`].
     fn cells(&self, scene: &Scene) -> Vec<CellRecord>;
+
+    /// See [`FrameLoop::light_probabilities`].
+    fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64>;
 
     /// See [`FrameLoop::choosing`].
     fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing>;
@@ -231,13 +285,16 @@ impl<D: DirectLight> Frames for Drawn<D> {
 
     /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
     /// nothing and their number changes nothing.
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
         let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
         let pace = self.direct.pace();
         film.set_weight(pace.frame_weight);
         let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
         let counters = tiles.map(|(tile, observations)| {
             observations.clear();
+            if stop.load(Ordering::Relaxed) {
+                return Counters::default();
+            }
             let mut log = TileLog {
                 observations,
                 counters: Counters::default(),
@@ -246,12 +303,15 @@ impl<D: DirectLight> Frames for Drawn<D> {
             log.counters
         });
         let counters = counters.reduce(Counters::default, Counters::add);
-        self.direct.end_frame(eye.scene, &self.observations);
+        if stop.load(Ordering::Relaxed) {
+            return (counters, false);
+        }
+        self.direct.end_frame(&eye.scene, &self.observations);
         if self.direct.pace().lessons != pace.lessons {
             // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
             self.first_frame = eye.frame.wrapping_add(1);
         }
-        counters
+        (counters, true)
     }
 
     fn scene_changed(&mut self, scene: &Scene) {
@@ -274,6 +334,19 @@ impl<D: DirectLight> Frames for Drawn<D> {
         self.direct.cells(scene)
     }
 
+    fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64> {
+        if self.direct.sampler_stats().is_none() {
+            return Vec::new();
+        }
+        let mut sums = vec![0.0; scene.lights.len()];
+        for point in points {
+            self.direct.add_pmfs(&self.direct.local(scene, point), &mut sums);
+        }
+        let count = points.len().max(1) as f64;
+        sums.iter_mut().for_each(|sum| *sum /= count);
+        sums
+    }
+
     fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing> {
         self.direct.sampler_stats()?;
         Some(choosing::measure(eye, &self.direct))
@@ -283,6 +356,7 @@ impl<D: DirectLight> Frames for Drawn<D> {
 /// A rendering with one way of making frames.
 struct Rendering<'s, F> {
     eye: Eye<'s>,
+    camera: Camera,
     aovs: bool,
     frames: F,
     film: Film,
@@ -293,9 +367,10 @@ struct Rendering<'s, F> {
 
 impl<'s, F: Frames> Rendering<'s, F> {
     /// `start` is when building the light structures began.
-    fn new(scene: &'s Scene, camera: &Camera, settings: &Settings, frames: F, start: Instant) -> Self {
+    fn new(scene: SceneRef<'s>, camera: &Camera, settings: &Settings, frames: F, start: Instant) -> Self {
         let mut new = Self {
             eye: Eye {
+                area_lights: has_area_lights(&scene),
                 scene,
                 camera: camera.rays(settings.width, settings.height),
                 filter: FilterSampler::new(settings.pixel_filter),
@@ -315,8 +390,8 @@ impl<'s, F: Frames> Rendering<'s, F> {
                     Method::Exact | Method::Oracle => 1,
                     Method::Sampled(_) => settings.candidates,
                 },
-                area_lights: scene.lights.iter().any(|light| !light.is_delta()),
             },
+            camera: camera.clone(),
             aovs: settings.aovs,
             frames,
             film: Film::new(settings.width, settings.height, settings.aovs),
@@ -330,18 +405,26 @@ impl<'s, F: Frames> Rendering<'s, F> {
     }
 }
 
+/// Whether rays can meet any light.
+fn has_area_lights(scene: &Scene) -> bool {
+    scene.lights.iter().any(|light| !light.is_delta())
+}
+
 impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
-    fn render_frame(&mut self) {
+    fn render_frame_unless(&mut self, stop: &AtomicBool) -> bool {
         let start = Instant::now();
-        let counters = if self.aovs {
-            self.frames.render::<true>(&self.eye, &mut self.film)
+        let (counters, finished) = if self.aovs {
+            self.frames.render::<true>(&self.eye, &mut self.film, stop)
         } else {
-            self.frames.render::<false>(&self.eye, &mut self.film)
+            self.frames.render::<false>(&self.eye, &mut self.film, stop)
         };
         self.counters = self.counters + counters;
-        self.film.advance();
         self.eye.frame = self.eye.frame.wrapping_add(1);
         self.render_s += start.elapsed().as_secs_f64();
+        if finished {
+            self.film.advance();
+        }
+        finished
     }
 
     fn film(&self) -> &Film {
@@ -354,11 +437,21 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
 
     fn set_camera(&mut self, camera: &Camera) {
         self.restart();
+        self.camera.clone_from(camera);
         self.eye.camera = camera.rays(self.eye.image_width, self.eye.image_height);
         self.frames.look(&self.eye, &mut self.film);
     }
 
-    fn set_scene(&mut self, scene: &'s Scene) -> Result<(), RenderError> {
+    fn set_film(&mut self, width: u32, height: u32, aovs: bool) -> Result<(), RenderError> {
+        settings::check_size(width, height)?;
+        (self.eye.image_width, self.eye.image_height, self.aovs) = (width, height, aovs);
+        self.restart();
+        self.eye.camera = self.camera.rays(width, height);
+        self.frames.look(&self.eye, &mut self.film);
+        Ok(())
+    }
+
+    fn set_scene(&mut self, scene: SceneRef<'s>) -> Result<(), RenderError> {
         let (before, now) = (self.eye.scene.lights.len(), scene.lights.len());
         if before != now {
             return Err(RenderError::Setting {
@@ -367,8 +460,9 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
             });
         }
         self.restart();
+        self.eye.area_lights = has_area_lights(&scene);
+        self.frames.scene_changed(&scene);
         self.eye.scene = scene;
-        self.frames.scene_changed(scene);
         self.frames.look(&self.eye, &mut self.film);
         Ok(())
     }
@@ -381,10 +475,10 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
                 skipped.push(what.into());
             }
         };
-        let Eye { scene, area_lights, .. } = self.eye;
+        let Eye { scene, area_lights, .. } = &self.eye;
         skip(scene.lights.is_empty(), "no lights: no light sampling, no bounces");
         skip(
-            !area_lights && !scene.lights.is_empty(),
+            !*area_lights && !scene.lights.is_empty(),
             "punctual lights only: no BSDF rays towards lights, no multiple importance sampling",
         );
         skip(self.eye.max_bounces == 0, "no bounces asked for: no indirect light");
@@ -403,11 +497,15 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     }
 
     fn light_records(&self) -> Vec<LightRecord> {
-        self.frames.light_records(self.eye.scene)
+        self.frames.light_records(&self.eye.scene)
     }
 
     fn cells(&self) -> Vec<CellRecord> {
-        self.frames.cells(self.eye.scene)
+        self.frames.cells(&self.eye.scene)
+    }
+
+    fn light_probabilities(&self, points: &[ShadingPoint]) -> Vec<f64> {
+        self.frames.light_probabilities(&self.eye.scene, points)
     }
 
     fn choosing(&self) -> Option<Choosing> {

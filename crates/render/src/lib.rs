@@ -24,6 +24,6 @@ pub mod settings;
 pub use choosing::Choosing;
 pub use error::RenderError;
 pub use film::{Film, Image};
-pub use frame::{FrameLoop, RenderStats, renderer};
+pub use frame::{FrameLoop, RenderStats, SceneRef, renderer};
 pub use metric::ImageError;
 pub use settings::{MAX_CANDIDATES, MAX_LIGHT_SAMPLES, Method, Mis, PixelFilter, Settings};

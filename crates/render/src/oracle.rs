@@ -23,6 +23,7 @@ use sampling::hash::hash2;
 use sampling::{Discrete, unit_f32};
 use scene::{Scene, luminance};
 use std::ops::Add;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -76,13 +77,16 @@ impl Frames for Oracle {
         self.prepare_s += start.elapsed().as_secs_f64();
     }
 
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film) -> Counters {
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
         let tiles = film.tiles_mut().par_iter_mut().zip(&self.tiles);
         let counters = tiles.map(|(tile, known)| {
             let mut log = TileLog {
                 observations: &mut Vec::new(),
                 counters: Counters::default(),
             };
+            if stop.load(Ordering::Relaxed) {
+                return log.counters;
+            }
             for ((index, (x, y)), pixel) in pixels_of(tile).enumerate().zip(known) {
                 let direct = OneLight(pixel);
                 let view = eye.view(&direct);
@@ -101,7 +105,8 @@ impl Frames for Oracle {
             }
             log.counters
         });
-        counters.reduce(Counters::default, Counters::add)
+        let counters = counters.reduce(Counters::default, Counters::add);
+        (counters, !stop.load(Ordering::Relaxed))
     }
 
     /// Everything is looked at anew in any case.
@@ -123,6 +128,10 @@ impl Frames for Oracle {
     }
 
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
+        Vec::new()
+    }
+
+    fn light_probabilities(&self, _scene: &Scene, _points: &[ShadingPoint]) -> Vec<f64> {
         Vec::new()
     }
 

@@ -112,6 +112,7 @@ impl Probe for AovSample {
             albedo: surface.bsdf.diffuse + surface.bsdf.f0,
             normal_ws: surface.bsdf.normal_ws,
             position_ws: surface.position_ws,
+            emitted: surface.emitted,
             depth: distance,
             light: light.map_or(-1, i64::from),
         };

@@ -222,13 +222,10 @@ fn default_oracle_passes() -> u32 {
 }
 
 impl Settings {
-    /// Widest and tallest image.
-    const MAX_SIZE: u32 = 32_768;
-
     /// # Errors
     /// [`RenderError::Setting`] for a setting out of its range, with the range.
     pub fn check(&self) -> Result<(), RenderError> {
-        let sizes = 1..=Self::MAX_SIZE;
+        check_size(self.width, self.height)?;
         let share = 0.0..=1.0;
         let refuse = |what: String, remedy: &str| {
             Err(RenderError::Setting {
@@ -236,10 +233,6 @@ impl Settings {
                 remedy: remedy.into(),
             })
         };
-        if !sizes.contains(&self.width) || !sizes.contains(&self.height) {
-            let what = format!("image of {} x {} pixels", self.width, self.height);
-            return refuse(what, "width and height must be 1 to 32,768");
-        }
         if self.method == Method::Oracle && self.max_bounces > 0 {
             return refuse(
                 format!("oracle with max_bounces = {}", self.max_bounces),
@@ -281,6 +274,19 @@ impl Settings {
         }
         Ok(())
     }
+}
+
+/// # Errors
+/// [`RenderError::Setting`] for an image that is too large, or empty.
+pub(crate) fn check_size(width: u32, height: u32) -> Result<(), RenderError> {
+    const SIZES: std::ops::RangeInclusive<u32> = 1..=32_768;
+    if SIZES.contains(&width) && SIZES.contains(&height) {
+        return Ok(());
+    }
+    Err(RenderError::Setting {
+        what: format!("image of {width} x {height} pixels"),
+        remedy: "width and height must be 1 to 32,768".into(),
+    })
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::{
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// What a loader or generator fills. Anyone may make one; [`Scene::new`] checks it.
@@ -38,7 +39,7 @@ pub struct SceneParts {
 }
 
 /// A scene ready for rendering.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Scene {
     /// Geometry, materials, textures, cameras, report. Changing them does not change what was built from them.
     pub parts: SceneParts,
@@ -52,9 +53,9 @@ pub struct Scene {
     /// Seconds spent in building the BVH.
     pub build_s: f64,
     pub(crate) shading: Shading,
-    bvh: Bvh,
+    bvh: Arc<Bvh>,
     /// Index into `parts.punctual` by light; empty if there are none.
-    punctual_of_light: Vec<u32>,
+    pub(crate) punctual_of_light: Vec<u32>,
     /// By mesh, the first triangle of each run of triangles that come from one primitive of the file.
     runs: Vec<Vec<u32>>,
 }
@@ -116,7 +117,7 @@ impl Scene {
         let Collected { lights, punctual } = collect(&mut parts, &mut shading, radius);
         let runs = parts.meshes.iter().map(runs).collect();
         let start = Instant::now();
-        let bvh = Bvh::build(&parts);
+        let bvh = Arc::new(Bvh::build(&parts));
         let mut scene = Self {
             parts,
             lights,

@@ -36,6 +36,11 @@ impl TriangleRecord {
         self.material & !Self::FLAGS
     }
 
+    /// Gives it another material that has textures where the old one has.
+    pub(crate) fn set_material(&mut self, material: u32) {
+        self.material = self.material & Self::FLAGS | material;
+    }
+
     /// Flat and of one colour: the record says it all.
     #[inline]
     pub(crate) fn plain(&self) -> bool {
@@ -109,7 +114,7 @@ pub(crate) struct Placement {
 }
 
 /// All records of a scene.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Shading {
     pub(crate) placements: Vec<Placement>,
     pub(crate) triangles: Vec<TriangleRecord>,

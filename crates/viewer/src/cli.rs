@@ -1,7 +1,7 @@
 //! The command line: commands, and the options that several of them share.
 
 use crate::exit::Refusal;
-use crate::{cmd, machine};
+use crate::{cmd, machine, view};
 use anyhow::Result;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -18,7 +18,8 @@ use sampling::PixelSampler;
     subcommand_required = true,
     after_help = "\
 Examples:
-  manylight render demo:rooms -o rooms.png            a building with 2,048 lights, nothing to download
+  manylight demo:rooms                                walk through a building with 2,048 lights, in a window
+  manylight render demo:rooms -o rooms.png            an image of it, nothing to download
   manylight render hall.glb -o hall.exr --time 60     your own glTF, one minute
   manylight info hall.glb                             what was loaded, what was ignored and why
   manylight dump hall.glb -o - --top 10               the ten lights that matter most, as CSV
@@ -42,6 +43,8 @@ pub(crate) struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Walk through a scene in a window
+    View(Box<view::ViewArgs>),
     /// Render an image to a file
     Render(Box<cmd::render::RenderArgs>),
     /// Compare samplers: frame times, and how fast the error falls

@@ -48,6 +48,11 @@ pub(crate) fn peak_rss_bytes() -> u64 {
     proc_field("/proc/self/status", "VmHWM:").unwrap_or(0)
 }
 
+/// The memory that the process holds now, bytes; 0 where the system does not tell.
+pub(crate) fn rss_bytes() -> u64 {
+    proc_field("/proc/self/status", "VmRSS:").unwrap_or(0)
+}
+
 /// Memory that is free or can be freed, bytes, if the system tells.
 pub(crate) fn available_memory_bytes() -> Option<u64> {
     proc_field("/proc/meminfo", "MemAvailable:")

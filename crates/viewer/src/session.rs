@@ -6,7 +6,7 @@ use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::{machine, message};
 use anyhow::{Context, Result, bail};
-use render::{FrameLoop, Settings};
+use render::{FrameLoop, SceneRef, Settings};
 use scene::{Camera, Scene};
 use std::path::Path;
 use std::time::Instant;
@@ -114,7 +114,11 @@ pub(crate) fn camera<'s>(scene: &'s Scene, wanted: Option<&str>) -> Result<&'s C
 ///
 /// # Errors
 /// Settings out of range; [`Refusal::OutOfMemory`].
-pub(crate) fn start<'s>(scene: &'s Scene, camera: &Camera, settings: &Settings) -> Result<Box<dyn FrameLoop<'s> + 's>> {
+pub(crate) fn start<'s>(
+    scene: impl Into<SceneRef<'s>>,
+    camera: &Camera,
+    settings: &Settings,
+) -> Result<Box<dyn FrameLoop<'s> + 's>> {
     // Compensated sums, moments, finished image and what the file writer copies; auxiliary images about double it.
     let bytes_per_pixel = if settings.aovs { 256 } else { 128 };
     let bytes = u64::from(settings.width) * u64::from(settings.height) * bytes_per_pixel;

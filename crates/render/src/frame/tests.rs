@@ -144,6 +144,55 @@ fn standard_error(film: &Film) -> f64 {
 }
 
 #[test]
+fn a_frame_that_is_stopped_does_not_count_and_the_next_one_does() {
+    let scene = box_scene(lambert(0.5), lamp(), &[]);
+    let mut frame_loop = renderer(&scene, &camera(), &settings(UNIFORM, 16, 0)).expect("valid settings");
+    assert!(!frame_loop.render_frame_unless(&AtomicBool::new(true)));
+    assert_eq!(frame_loop.film().spp(), 0);
+    assert!(frame_loop.film().image().pixels.iter().all(|pixel| *pixel == [0.0; 3]));
+    assert!(frame_loop.render_frame_unless(&AtomicBool::new(false)));
+    assert_eq!(frame_loop.film().spp(), 1);
+}
+
+#[test]
+fn another_size_starts_the_image_anew_with_the_same_view() {
+    let scene = box_scene(lambert(0.5), lamp(), &[]);
+    let mut frame_loop = renderer(&scene, &camera(), &settings(UNIFORM, 16, 0)).expect("valid settings");
+    frame_loop.render_frame();
+    frame_loop.set_film(32, 24, true).expect("a valid size");
+    assert_eq!(
+        (
+            frame_loop.film().width(),
+            frame_loop.film().height(),
+            frame_loop.film().spp()
+        ),
+        (32, 24, 0)
+    );
+    frame_loop.render_frame();
+    assert!(frame_loop.film().aovs().is_some());
+    let message = frame_loop.set_film(0, 24, false).expect_err("no pixels").to_string();
+    assert!(message.contains("0 x 24"), "{message}");
+}
+
+#[test]
+fn probabilities_of_all_lights_at_a_point_add_up_to_one() {
+    let scene = box_scene(lambert(0.5), lamp(), &[]);
+    let point = ShadingPoint {
+        position_ws: scene.center_ws,
+        normal_ws: Vec3::Y,
+        primary: true,
+    };
+    for method in [UNIFORM, Method::Sampled(SamplerKind::Adaptive)] {
+        let mut frame_loop = renderer(&scene, &camera(), &settings(method, 16, 0)).expect("valid settings");
+        frame_loop.render_frame();
+        let sum: f64 = frame_loop.light_probabilities(&[point, point]).iter().sum();
+        assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+    }
+    let exact = renderer(&scene, &camera(), &settings(Method::Exact, 16, 0)).expect("valid settings");
+    assert!(exact.light_probabilities(&[point]).is_empty());
+}
+
+#[test]
 fn a_furnace_is_as_bright_as_its_geometric_series() {
     let wall = Material {
         emission: Vec3::ONE,
@@ -422,7 +471,7 @@ fn camera_and_scene_may_change() {
         frame_loop.set_camera(&elsewhere);
         assert_eq!(frame_loop.film().spp(), 0);
         frame_loop.render_frame();
-        frame_loop.set_scene(&after).expect("as many lights");
+        frame_loop.set_scene((&after).into()).expect("as many lights");
         (0..512).for_each(|_| frame_loop.render_frame());
         assert_eq!(frame_loop.stats().frames, 512);
         let (found, error) = (mean(&frame_loop.film().image()), standard_error(frame_loop.film()));
@@ -438,7 +487,10 @@ fn camera_and_scene_may_change() {
     }
     let other = box_scene(lambert(0.5), None, &points);
     let mut frame_loop = rendered(&before, &settings(UNIFORM, 16, 0), 1);
-    let message = frame_loop.set_scene(&other).expect_err("fewer lights").to_string();
+    let message = frame_loop
+        .set_scene((&other).into())
+        .expect_err("fewer lights")
+        .to_string();
     assert!(message.contains("3 lights") && message.contains('1'), "{message}");
 }
 

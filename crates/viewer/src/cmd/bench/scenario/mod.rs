@@ -182,7 +182,7 @@ fn drive(
             if built_anew {
                 renderer = start(next)?;
             } else {
-                renderer.set_scene(&plan.states[next.0])?;
+                renderer.set_scene((&plan.states[next.0]).into())?;
             }
         }
         if next.1 != now.1 {
