@@ -98,12 +98,15 @@ impl Reference {
         let each = spp.div_ceil(2);
         let mut images = Vec::with_capacity(SEEDS.len());
         for (half, seed) in (1..).zip(SEEDS) {
+            // What only says how to get there is not part of it: all ways have one reference.
             let settings = Settings {
                 method: Method::Exact,
                 seed,
-                light: light_cache::Settings::default(),
-                oracle_passes: Settings::default().oracle_passes,
-                ..settings.clone()
+                width: settings.width,
+                height: settings.height,
+                max_bounces: settings.max_bounces,
+                pixel_filter: settings.pixel_filter,
+                ..Settings::default()
             };
             let path = cache.join(key(scene, camera, &settings, each)? + ".exr");
             if let Ok(kept) = image::read_exr(&path) {
