@@ -135,8 +135,8 @@ pub struct Settings {
     /// eye rays are dear; lower values make more frames. `exact` draws none.
     #[serde(default = "default_light_samples")]
     pub light_samples: u32,
-    /// Lights compared for each one that is drawn at a glossy surface, 1..=[`MAX_CANDIDATES`]: one of them is kept in proportion to what it would
-    /// add there, reflection included. Higher values find the lights that are mirrored; lower values are faster; 1 compares none.
+    /// Lights compared for each one that is drawn at a glossy surface, 1..=[`MAX_CANDIDATES`]: one of them is kept in proportion to how it is
+    /// reflected. Higher values find the lights that are mirrored; lower values are faster; 1 compares none.
     #[serde(default = "default_candidates")]
     pub candidates: u32,
     /// Seed of all random numbers: same seed, same image, on any number of threads.

@@ -73,7 +73,7 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "N", default_value_t = render::Settings::default().light_samples,
           value_parser = clap::value_parser!(u32).range(1..=i64::from(render::MAX_LIGHT_SAMPLES)))]
     pub(crate) light_samples: u32,
-    /// Lights compared for each one that is drawn at a glossy surface, 1 to 8: kept in proportion to what it would add
+    /// Lights compared for each one that is drawn at a glossy surface, 1 to 8: one is kept, by how it is reflected
     ///
     /// Higher values find the lights that are mirrored; lower values are faster; 1 compares none.
     #[arg(long, value_name = "N", default_value_t = render::Settings::default().candidates,

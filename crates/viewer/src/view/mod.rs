@@ -31,6 +31,7 @@ use clap::Args;
 use render::Method;
 use script::Script;
 use std::path::PathBuf;
+use winit::error::EventLoopError;
 use winit::event_loop::EventLoop;
 
 /// Options of `view`.
@@ -97,8 +98,13 @@ pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
     settings.check()?;
     session::use_threads(args.light.threads)?;
     let event_loop = EventLoop::with_user_event().build().map_err(|error| {
+        let why = match error {
+            // What the library says names its own source files.
+            EventLoopError::Os(_) => "no display answers: are DISPLAY or WAYLAND_DISPLAY set?".into(),
+            other => other.to_string(),
+        };
         Refusal::NoGpu(format!(
-            "no window can be opened here ({error}); run it on a desktop, under `xvfb-run`, or use `manylight render`"
+            "no window can be opened here ({why}); run it on a desktop, under `xvfb-run`, or use `manylight render`"
         ))
     })?;
     let mut app = App::new(args, settings, script, event_loop.create_proxy())?;
