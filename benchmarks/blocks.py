@@ -6,6 +6,7 @@ Renders each generated scene with several seeds by the sampler and by `exact`, d
 blocks, without the pixels that are much brighter than those around them: a lamp that covers a sliver of a pixel is met by some eye ray of a
 thousand and by none of 32, which says nothing about how lights are chosen. Welch's t between the seeds, said as the normal deviate of the same probability (Wallace 1959), since a standard error from few
 seeds is uncertain itself. Says how many blocks lie beyond 3; by chance 0.27 % do.
+With --against PREFIX one scene is compared with another renderer's images PREFIX-*.npy in place of `exact` (peers/lux_run.py writes such).
 Writes blocks.json. Needs `pip install mitsuba numpy` to read OpenEXR.
 """
 import argparse
@@ -20,6 +21,7 @@ import numpy as np
 mi.set_variant("scalar_rgb")
 BLOCK = 32
 BRIGHTER = 1.5
+LUMINANCE = np.array((0.2126, 0.7152, 0.0722))
 SIZE = (256, 192)
 
 
@@ -32,7 +34,7 @@ def luminance(args, scene, sampler, spp, seed, folder):
         if done.returncode:
             sys.exit(f"{' '.join(map(str, command))}\n{done.stderr}")
     rgb = np.array(mi.Bitmap(str(out)).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-    return rgb.astype(np.float64) @ np.array((0.2126, 0.7152, 0.0722))
+    return rgb.astype(np.float64) @ LUMINANCE
 
 
 def without_lamps(image):
@@ -68,6 +70,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=4)
     parser.add_argument("--exact-spp", type=int, default=2)
     parser.add_argument("--exact-seeds", type=int, default=16)
+    parser.add_argument("--against", type=pathlib.Path, metavar="PREFIX")
     parser.add_argument("-o", "--out", type=pathlib.Path, required=True)
     args = parser.parse_args()
     images = args.out / "images"
@@ -75,7 +78,10 @@ def main():
     results = {}
     for scene in args.scenes.split(","):
         ours = [luminance(args, scene, args.sampler, args.spp, seed, images) for seed in range(args.seeds)]
-        exact = [luminance(args, scene, "exact", args.exact_spp, 1000 + seed, images) for seed in range(args.exact_seeds)]
+        if args.against:
+            exact = [np.load(file) @ LUMINANCE for file in sorted(args.against.parent.glob(f"{args.against.name}-*.npy"))]
+        else:
+            exact = [luminance(args, scene, "exact", args.exact_spp, 1000 + seed, images) for seed in range(args.exact_seeds)]
         kept = without_lamps(np.mean(ours, 0))
         ours, exact = ([block_sums(image * kept) for image in all_seeds] for all_seeds in (ours, exact))
         z, error, ratio = deviates(ours, exact)
@@ -87,7 +93,7 @@ def main():
         told = results[scene]
         print(f"{scene:16} {told['beyond_3']} of {told['blocks']} blocks beyond 3 ({told['pixels_left_out']} pixels left out), largest {told['largest']:.2f}, rms z {told['rms_z']:.2f}, "
               f"means {told['ratio_of_means']:.5f}, error of a block {told['relative_error_of_a_block']:.1e}", flush=True)
-    (args.out / "blocks.json").write_text(json.dumps({"sampler": args.sampler, "spp": args.spp, "scenes": results}, indent=1))
+    (args.out / "blocks.json").write_text(json.dumps({"sampler": args.sampler, "spp": args.spp, "against": args.against.name if args.against else "exact", "scenes": results}, indent=1))
 
 
 if __name__ == "__main__":
