@@ -1,7 +1,7 @@
 //! Several techniques for one integral: combined beforehand, or sample by sample.
 
 use super::linear::solve;
-use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_and_rest, sub_seed};
 use crate::integrands::{Integrand, Technique};
 use crate::mis::Heuristic;
 use crate::points::PointSet;
@@ -92,11 +92,7 @@ impl Estimator for APriori {
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {
         let techniques = combinable(integrand)?;
         let k = techniques.len();
-        let pilot = pilot_size(n) / k;
-        if pilot < 4 || n / k < pilot + 2 {
-            return None;
-        }
-        let count = n / k - pilot;
+        let (pilot, count) = pilot_and_rest(n, k)?;
         let weights = self.weights(&self.values(integrand, techniques, pilot, sub_seed(seed, 0))?, k);
         // For correlated techniques the sums are what is independent; for independent ones it makes no difference.
         let mut sums = Moments::default();

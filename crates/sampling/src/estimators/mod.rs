@@ -152,6 +152,12 @@ const PILOT_SHARE: f64 = 0.25;
 /// Fewest samples from which a variance is worth being estimated.
 const MIN_PILOT: usize = 8;
 
+/// How many samples of each of `k` techniques are spent on looking, and how many are left, of `n` in all; `None` if that is too few.
+fn pilot_and_rest(n: usize, k: usize) -> Option<(usize, usize)> {
+    let pilot = pilot_size(n) / k;
+    (pilot >= 4 && n / k >= pilot + 2).then(|| (pilot, n / k - pilot))
+}
+
 /// The samples to look with, of `n`.
 fn pilot_size(n: usize) -> usize {
     ((n as f64 * PILOT_SHARE) as usize).max(MIN_PILOT)

@@ -1,7 +1,7 @@
 //! Multiple importance sampling with optimal weights.
 
 use super::linear::solve;
-use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_size, sub_seed};
+use super::{Estimate, Estimator, Family, combinable, for_each_draw, pilot_and_rest, sub_seed};
 use crate::integrands::{Integrand, Technique};
 use crate::points::PointSet;
 use crate::statistics::Moments;
@@ -28,11 +28,7 @@ impl Estimator for OptimalMultipleImportance {
     fn estimate(&self, integrand: &dyn Integrand, n: usize, seed: u64) -> Option<Estimate> {
         let techniques = combinable(integrand)?;
         let k = techniques.len();
-        let pilot = pilot_size(n) / k;
-        if pilot < 4 || n / k < pilot + 2 {
-            return None;
-        }
-        let count = n / k - pilot;
+        let (pilot, count) = pilot_and_rest(n, k)?;
 
         let mut matrix = vec![vec![0.0; k]; k];
         let mut right = vec![0.0; k];

@@ -3,8 +3,12 @@
 //! While the camera moves, frames are small enough to keep the frame time; once it rests the picture is rendered in full
 //! and refined. A command that makes the picture worthless stops a frame in full size at once.
 
+mod messages;
+
+pub(super) use messages::{Command, Figures, Picture, Report};
+
 use super::denoise;
-use super::inspector::{self, Inspection};
+use super::inspector;
 use super::resolution::Resolution;
 use super::views::{Shown, View};
 use crate::{machine, session};
@@ -13,7 +17,6 @@ use light_cache::{SamplerKind, ShadingPoint};
 use render::image::{self, Channel};
 use render::{FrameLoop, Image, Method, Settings};
 use scene::{Camera, PrimitiveId, Ray, Scene};
-use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,88 +33,6 @@ const FINISHED_SPP: u64 = 1 << 16;
 const CLEAN_SPP: u64 = 128;
 /// Least time between two reports of what lights matter.
 const BETWEEN_IMPORTANCES: Duration = Duration::from_millis(500);
-
-/// What the window wants.
-#[derive(Debug)]
-pub(super) enum Command {
-    /// Another scene, seen from there.
-    Scene(Arc<Scene>, Camera),
-    /// Another camera, because of an input at that time.
-    Look(Camera, Instant),
-    /// Another size of the window, in pixels.
-    Resize(u32, u32),
-    /// Another way of rendering; size and auxiliary images are not looked at.
-    Render(Box<Settings>),
-    /// Another view.
-    Show(View),
-    /// Milliseconds for a frame while the picture moves.
-    Budget(f64),
-    /// Whether noise is taken away, for the eyes only.
-    Denoise(bool),
-    /// Lights that shine by a factor of what the scene says; all others as it says.
-    Relight(Vec<(u32, Vec3)>),
-    /// Whether the probabilities of all lights are wanted.
-    Importance(bool),
-    /// Stops or goes on.
-    Pause(bool),
-    /// Tells about the pixel at this share of width and height.
-    Inspect(Vec2),
-    /// Writes the picture as it is, linear.
-    SaveExr(PathBuf),
-}
-
-impl Command {
-    /// Whether it is not to wait until a frame in full size has ended.
-    fn is_urgent(&self) -> bool {
-        !matches!(self, Self::Budget(_) | Self::Importance(_) | Self::SaveExr(_))
-    }
-}
-
-/// What the window is told.
-#[derive(Debug)]
-pub(super) enum Report {
-    /// [`Renderer::take_picture`] has something.
-    Picture,
-    /// The answer to [`Command::Inspect`]; `None` where there is nothing.
-    Inspected(Option<Box<Inspection>>),
-    /// The probability of each light, mean over the picture; empty where lights are not chosen.
-    Importance(Vec<f64>),
-    /// A file was written, or why not.
-    Saved(Result<PathBuf, String>),
-    /// Something that the user should know.
-    Trouble(String),
-}
-
-/// A picture to be shown.
-#[derive(Debug)]
-pub(super) struct Picture {
-    pub(super) width: u32,
-    pub(super) height: u32,
-    pub(super) shown: Shown,
-    /// The exposure in stops that suits it; `None` for other views than the image.
-    pub(super) exposure: Option<f32>,
-    pub(super) figures: Figures,
-}
-
-/// Figures of a picture.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Figures {
-    /// Samples per pixel.
-    pub(super) spp: u64,
-    /// The camera rests: the picture has its full size.
-    pub(super) still: bool,
-    pub(super) view: View,
-    /// Size in which it was rendered.
-    pub(super) size: (u32, u32),
-    /// Milliseconds of rendering per picture.
-    pub(super) frame_ms: f64,
-    pub(super) rays_per_s: f64,
-    pub(super) cells: usize,
-    /// Bytes of what the sampler keeps.
-    pub(super) sampler_bytes: usize,
-    /// The first input that it is the first to show.
-    pub(super) input: Option<Instant>,
-}
 
 /// The window's side of the thread.
 #[derive(Debug)]
