@@ -57,6 +57,20 @@ pub struct Choice {
     pub light: u32,
     /// The probability with which it was drawn, exactly as [`LightSampler::pmf`] reports it. Above 0.
     pub pmf: f32,
+    /// Irradiance per channel to add to what the light brings, once per draw: a control variate. Its mean over all draws at a point is
+    /// zero. Zero too where a sampler has none.
+    pub control: Vec3,
+}
+
+impl Choice {
+    /// Without a control variate.
+    pub fn new(light: u32, pmf: f32) -> Self {
+        Self {
+            light,
+            pmf,
+            control: Vec3::ZERO,
+        }
+    }
 }
 
 /// What an eye-path vertex found out about a light.

@@ -160,10 +160,7 @@ impl LightSampler for OctreeSampler {
             rest.sample((((u64::from(u - cell.rest()) << 32) | u64::from(low)) / share) as u32)
                 .index
         };
-        Some(Choice {
-            light,
-            pmf: self.pmf(local, light),
-        })
+        Some(Choice::new(light, self.pmf(local, light)))
     }
 
     #[inline]

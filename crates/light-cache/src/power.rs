@@ -36,10 +36,7 @@ impl LightSampler for PowerSampler {
     #[inline]
     fn sample(&self, (): &(), u: u32) -> Option<Choice> {
         let draw = self.distribution.as_ref()?.sample(u);
-        Some(Choice {
-            light: draw.index,
-            pmf: draw.pmf(),
-        })
+        Some(Choice::new(draw.index, draw.pmf()))
     }
 
     #[inline]

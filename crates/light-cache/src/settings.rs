@@ -59,6 +59,9 @@ pub struct Settings {
     pub table_decay: f32,
     /// Biased, off at 0: lights whose table entry is below this share of the mean are ignored. Higher values drop more.
     pub ignore_below: f32,
+    /// `adaptive`: what each light is expected to bring to a point is added up, and draws only find out by how much it is off (a control
+    /// variate; pixels may come out below zero). On: less noise; off: less work at every point.
+    pub control_variate: bool,
     /// `octree`: halvings of the scene's bounding cube per axis, 0..=7. Higher values fit lights to smaller places; lower
     /// values fill fewer cells. 5.
     pub octree_depth: u32,
@@ -73,6 +76,7 @@ impl Default for Settings {
             min_probability_mass: 0.005,
             table_decay: 0.9,
             ignore_below: 0.0,
+            control_variate: true,
             octree_depth: 5,
             octree_bright: 64,
         }

@@ -286,10 +286,7 @@ impl LightSampler for TableSampler {
     #[inline]
     fn sample(&self, local: &Option<&Discrete>, u: u32) -> Option<Choice> {
         let draw = (*local)?.sample(u);
-        Some(Choice {
-            light: draw.index,
-            pmf: draw.pmf(),
-        })
+        Some(Choice::new(draw.index, draw.pmf()))
     }
 
     #[inline]

@@ -140,17 +140,14 @@ impl LightSampler for TreeVisibleSampler {
             return None;
         }
         if let Some(place) = self.floor.draw(u) {
-            return Some(Choice {
-                light: self.tree.light_at(place),
-                pmf: self.pmf_at(local, place),
-            });
+            return Some(Choice::new(self.tree.light_at(place), self.pmf_at(local, place)));
         }
         let x = position(u, local.salt) - self.floor.start_of_rest();
         let (place, width) = local.descent.draw(x, self.floor.rest());
-        Some(Choice {
-            light: self.tree.light_at(place),
-            pmf: probability(self.floor.width() + width),
-        })
+        Some(Choice::new(
+            self.tree.light_at(place),
+            probability(self.floor.width() + width),
+        ))
     }
 
     #[inline]

@@ -52,18 +52,12 @@ impl LightSampler for UniformSampler {
     #[inline]
     fn sample(&self, (): &(), u: u32) -> Option<Choice> {
         if self.count < 2 {
-            return (self.count == 1).then_some(Choice { light: 0, pmf: 1.0 });
+            return (self.count == 1).then_some(Choice::new(0, 1.0));
         }
         Some(if u64::from(u) < self.boundary {
-            Choice {
-                light: u / (self.units + 1),
-                pmf: self.pmf_longer,
-            }
+            Choice::new(u / (self.units + 1), self.pmf_longer)
         } else {
-            Choice {
-                light: self.longer + (u - self.boundary as u32) / self.units,
-                pmf: self.pmf_rest,
-            }
+            Choice::new(self.longer + (u - self.boundary as u32) / self.units, self.pmf_rest)
         })
     }
 

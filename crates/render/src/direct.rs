@@ -8,6 +8,7 @@ use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pa
 use sampling::mis::Heuristic;
 use sampling::{VertexSequence, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
+use std::f32::consts::FRAC_1_PI;
 
 /// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
 const SHADOW_RAY_END: f32 = 1.0 - 1.0 / (1 << 18) as f32;
@@ -156,6 +157,8 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         let mut radiance = Vec3::ZERO;
         for (choice, numbers) in choices.iter().zip(numbers) {
             let Some(choice) = choice else { continue };
+            // Whether or not the light arrives: the mean over all draws is zero.
+            radiance += vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
             let on_light = Vec2::from(numbers.point.map(unit_f32));
             let connection = Connection::new(scene, vertex, choice.light, count * choice.pmf, on_light);
             let visible = connection

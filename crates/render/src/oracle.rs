@@ -303,10 +303,7 @@ impl LightSampler for &Pixel {
         } else {
             self.lights[drawn as usize]
         };
-        Some(Choice {
-            light,
-            pmf: self.pmf(&(), light),
-        })
+        Some(Choice::new(light, self.pmf(&(), light)))
     }
 
     fn pmf(&self, (): &(), light: u32) -> f32 {

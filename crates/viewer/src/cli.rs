@@ -106,6 +106,11 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "MASS", default_value_t = light_cache::Settings::default().min_probability_mass,
           value_parser = share)]
     pub(crate) min_probability_mass: f32,
+    /// `adaptive`: draw lights without a control variate
+    ///
+    /// With it there is less noise, and pixels may come out below zero; without there is less work at every point.
+    #[arg(long)]
+    pub(crate) no_control_variate: bool,
     /// `oracle`: times that it looks at all lights from every pixel before it starts
     ///
     /// Higher values come closer to the best choice; lower values are prepared sooner.
@@ -176,6 +181,7 @@ impl LightArgs {
             mis: self.mis,
             light: light_cache::Settings {
                 min_probability_mass: self.min_probability_mass,
+                control_variate: !self.no_control_variate,
                 ignore_below: self.ignore_below,
                 ..Default::default()
             },

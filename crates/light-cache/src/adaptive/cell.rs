@@ -7,10 +7,12 @@
 
 use super::branch::Branch;
 use super::emitter::Emitter;
+use super::palette::Palette;
 use super::subcells::{Count, Cube, SubCells};
-use super::weights::{Lanes, Part, View, Wanted, Weights};
+use super::weights::{Factors, Part, View, Wanted, Weighed, Weights};
 use crate::Observation;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
+use glam::Vec3;
 
 /// Most entries of a cut. Higher values resolve more lights one by one; lower values learn faster and cost less.
 pub(super) const MAX_ENTRIES: usize = 96;
@@ -47,7 +49,9 @@ pub(super) struct Entry {
     pub(super) drawn: f32,
     /// Times drawn and visible.
     pub(super) visible: f32,
-    /// Sum of the squared ratios, visible ones only.
+    /// Sum of the ratios, visible ones only.
+    sum: f32,
+    /// Sum of their squares.
     sum_sq: f32,
     /// Root mean square ratio expected beforehand.
     prior: f32,
@@ -61,6 +65,12 @@ impl Entry {
         let n = self.drawn + PRIOR_COUNT;
         let fade = PRIOR_COUNT / n + LASTING_PRIOR;
         ((self.sum_sq + PRIOR_COUNT * fade * self.prior * self.prior) / n).sqrt()
+    }
+
+    /// Estimated mean ratio over the root mean square. Of what was never seen nothing is expected.
+    fn mean_over_ratio(&self) -> f32 {
+        let mean = self.sum / (self.drawn + PRIOR_COUNT);
+        if mean > 0.0 { mean / self.ratio() } else { 0.0 }
     }
 
     /// Weight in the cell as a whole.
@@ -84,7 +94,9 @@ impl Entry {
         self.drawn += times;
         if visible {
             self.visible += times;
-            self.sum_sq += times * ratio.min((SPIKE * expected).max(most)).powi(2);
+            let ratio = ratio.min((SPIKE * expected).max(most));
+            self.sum += times * ratio;
+            self.sum_sq += times * ratio * ratio;
         }
     }
 }
@@ -98,6 +110,15 @@ pub(super) struct Origin {
     pub(super) primary: bool,
     /// Number of the frame that it was made after.
     pub(super) frame: u64,
+}
+
+/// The lights of the scene, as cells know them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Lights<'l> {
+    /// All of them.
+    pub(super) tree: &'l Tree,
+    /// Their colours, for a control variate; `None` if there is none.
+    pub(super) palette: Option<&'l Palette>,
 }
 
 /// A cell of the grid.
@@ -125,7 +146,8 @@ pub(super) struct Cell {
 
 impl Cell {
     /// A new cell at its first observed points: a cut from the tree's own importance.
-    pub(super) fn new(origin: Origin, points: &[Receiver], tree: &Tree) -> Self {
+    pub(super) fn new(origin: Origin, points: &[Receiver], lights: Lights<'_>) -> Self {
+        let tree = lights.tree;
         let step = points.len().div_ceil(PROBES).max(1);
         let mut cell = Self {
             origin,
@@ -133,7 +155,7 @@ impl Cell {
             entries: Vec::with_capacity(FIRST_ENTRIES + MAX_LEAF_LIGHTS),
             firsts: Vec::new(),
             weights: Weights::default(),
-            subcells: SubCells::new(),
+            subcells: SubCells::new(lights.palette.is_some()),
             seen: 0.0,
             built_at: 0.0,
             refined_at: 0.0,
@@ -153,7 +175,7 @@ impl Cell {
             let Some(j) = heaviest else { break };
             cell.divide(tree, j);
         }
-        cell.build(tree);
+        cell.build(lights);
         cell
     }
 
@@ -176,6 +198,7 @@ impl Cell {
             scale: self.scale(&emitter),
             drawn: 0.0,
             visible: 0.0,
+            sum: 0.0,
             sum_sq: 0.0,
             prior: 1.0,
         }
@@ -219,11 +242,12 @@ impl Cell {
     /// Learns from the cell's observations of one frame, in order. `unit`: what the tree's importance is measured in.
     pub(super) fn learn<'o>(
         &mut self,
-        tree: &Tree,
+        lights: Lights<'_>,
         unit: f32,
         may_grow: bool,
         observations: impl Iterator<Item = &'o (&'o Observation, Cube)>,
     ) {
+        let tree = lights.tree;
         for &(o, cube) in observations {
             let times = o.weight as f32;
             let place = tree.rank[o.light as usize];
@@ -248,11 +272,11 @@ impl Cell {
             let new: Vec<Branch> = self.branches().collect();
             self.subcells.recut(tree, &old, &new);
             self.refined_at = self.seen;
-            self.build(tree);
+            self.build(lights);
             self.subcells.refresh(&self.counts(), true);
             return;
         } else if self.seen >= REBUILD_GROWTH * self.built_at {
-            self.build(tree);
+            self.build(lights);
         }
         self.subcells.refresh(&self.counts(), false);
     }
@@ -335,14 +359,22 @@ impl Cell {
     }
 
     /// Makes the learned weights ready for use.
-    fn build(&mut self, tree: &Tree) {
+    fn build(&mut self, lights: Lights<'_>) {
+        let Lights { tree, palette } = lights;
         self.built_at = self.seen;
         self.total = self.entries.iter().map(Entry::weight).sum();
         self.firsts.clear();
         self.firsts
             .extend(self.entries.iter().map(|entry| entry.branch.first(tree)));
-        let learned: Vec<_> = self.entries.iter().map(|e| (e.branch, e.learned(tree))).collect();
-        self.weights = Weights::new(&learned);
+        let weighed = self.entries.iter().map(|entry| Weighed {
+            branch: entry.branch,
+            emitter: entry.learned(tree),
+            expected: palette.map_or(Vec3::ZERO, |palette| {
+                palette.color(tree, entry.branch) * entry.mean_over_ratio()
+            }),
+        });
+        let weighed: Vec<Weighed> = weighed.collect();
+        self.weights = Weights::new(&weighed, palette.is_some());
     }
 }
 
@@ -350,8 +382,7 @@ impl Cell {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearby<'c> {
     cell: &'c Cell,
-    /// By which the weights are multiplied; empty for 1.
-    factors: &'c [Lanes],
+    factors: Factors<'c>,
 }
 
 impl Nearby<'_> {

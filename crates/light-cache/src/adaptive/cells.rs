@@ -1,6 +1,6 @@
 //! All cells: which observation belongs to which, and making them.
 
-use super::cell::{Cell, Entry, Nearby, Origin};
+use super::cell::{Cell, Entry, Lights, Nearby, Origin};
 use super::grid::{Grid, NO_CELL, Spot, dominant_axis};
 use super::subcells::Cube;
 use crate::tree::{Receiver, Tree};
@@ -30,6 +30,12 @@ impl Cells {
             cells: Vec::new(),
             unit,
         }
+    }
+
+    /// Luminance of the irradiance that is 1 in the units of weights.
+    #[inline]
+    pub(super) fn unit(&self) -> f32 {
+        self.unit
     }
 
     /// Number of cells.
@@ -84,7 +90,7 @@ impl Cells {
 
     /// The cell and the cube of each observation, new cells made where they are missing. Runs through the logs in order, so cells
     /// are numbered alike on any number of threads.
-    fn assign(&mut self, tree: &Tree, frame: u64, logs: &[Vec<Observation>]) -> Vec<(u32, Cube)> {
+    fn assign(&mut self, lights: Lights<'_>, frame: u64, logs: &[Vec<Observation>]) -> Vec<(u32, Cube)> {
         let known = self.cells.len();
         let mut seeds: Vec<Seed> = Vec::new();
         let grid = &self.grid;
@@ -122,15 +128,15 @@ impl Cells {
             .collect();
         let new = seeds
             .par_iter()
-            .map(|(origin, points)| Cell::new(*origin, points, tree));
+            .map(|(origin, points)| Cell::new(*origin, points, lights));
         let new: Vec<Cell> = new.collect();
         self.cells.extend(new);
         assigned
     }
 
     /// Every cell learns from its own observations, in the order in which they were made.
-    pub(super) fn learn(&mut self, tree: &Tree, frame: u64, logs: &[Vec<Observation>]) {
-        let assigned = self.assign(tree, frame, logs);
+    pub(super) fn learn(&mut self, lights: Lights<'_>, frame: u64, logs: &[Vec<Observation>]) {
+        let assigned = self.assign(lights, frame, logs);
         let mut ends = vec![0u32; self.cells.len() + 1];
         for &(cell, _) in assigned.iter().filter(|(cell, _)| *cell != NO_CELL) {
             ends[cell as usize + 1] += 1;
@@ -152,7 +158,7 @@ impl Cells {
         self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
             let range = starts[i] as usize..starts[i + 1] as usize;
             if !range.is_empty() {
-                cell.learn(tree, unit, may_grow, by_cell[range].iter().flatten());
+                cell.learn(lights, unit, may_grow, by_cell[range].iter().flatten());
             }
         });
     }

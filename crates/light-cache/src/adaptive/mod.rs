@@ -6,6 +6,10 @@
 //! random numbers goes to the global importance table, which holds the guaranteed minimum of every light and every light that ever mattered
 //! anywhere in the image. Where shadows are finer than a cell, cubes within it count the visible share of each entry.
 //!
+//! The same evaluation adds up what the whole cut is expected to bring, in colour: a control variate, so that a draw only has to find out
+//! by how much the light it finds differs from what was expected of it (Szecsi, Sbert and Szirmay-Kalos 2004, Combined correlated and importance sampling in
+//! direct light source computation and environment mapping; Vevoda et al. 2018). Entries that are expected to be visible for certain are then drawn less.
+//!
 //! Related: Pantaleoni 2019 (Importance sampling of many lights with reinforcement lightcuts learning), Wang et al. 2021 (Learning to cluster for rendering with many
 //! lights), Vevoda et al. 2018 (Bayesian online regression for adaptive direct illumination sampling). Differs: what is learned are ratios of second moments to an
 //! estimate that is evaluated for the whole cut at every point (with vector instructions: about the time of a shadow ray), the
@@ -16,6 +20,7 @@ mod cell;
 mod cells;
 mod emitter;
 mod grid;
+mod palette;
 mod subcells;
 mod weights;
 
@@ -25,9 +30,10 @@ use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint,
     TableSampler, TreeVisibleSampler, records,
 };
-use cell::Nearby;
+use cell::{Lights, Nearby};
 use cells::Cells;
 use glam::Vec3;
+use palette::Palette;
 use scene::Scene;
 use std::time::Instant;
 use weights::{Part, Wanted};
@@ -48,6 +54,8 @@ pub struct AdaptiveSampler {
     prior: TreeVisibleSampler,
     table: TableSampler,
     cells: Cells,
+    /// For the control variate; `None` without.
+    palette: Option<Palette>,
     /// The table's part of 32-bit random numbers.
     table_mass: u32,
     /// Which frames are learned from.
@@ -101,8 +109,10 @@ impl AdaptiveSampler {
             min_probability_mass: (floor / share) as f32,
             ..settings.clone()
         };
+        let prior = TreeVisibleSampler::prior(lights, settings);
         Self {
-            prior: TreeVisibleSampler::prior(lights, settings),
+            palette: settings.control_variate.then(|| Palette::new(prior.tree(), lights)),
+            prior,
             table: TableSampler::net(lights, scene.radius, &within_table),
             cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
             table_mass: (share * 4_294_967_296.0) as u32,
@@ -158,20 +168,22 @@ impl LightSampler for AdaptiveSampler {
     fn sample(&self, local: &Local<'_>, u: u32) -> Option<Choice> {
         let x = position(u, local.salt);
         let table_width = self.table_width();
-        let (place, own) = match &local.source {
-            Source::Nothing => return None,
-            _ if x < table_width => return self.sample_table(local, x),
-            Source::Tree(descent) => descent.draw(x - table_width, UNIT - table_width),
+        match &local.source {
+            Source::Nothing => None,
+            _ if x < table_width => self.sample_table(local, x),
+            Source::Tree(descent) => {
+                let (place, own) = descent.draw(x - table_width, UNIT - table_width);
+                Some(self.choice(local, place, own))
+            }
             Source::Cell(cell) => {
                 let part = cell.draw(
                     &local.receiver,
                     (x - table_width) >> CELL_SHIFT,
                     (UNIT - table_width) >> CELL_SHIFT,
                 )?;
-                self.within(local, &part, x - table_width)
+                Some(self.within(local, &part, x - table_width))
             }
-        };
-        Some(self.choice(local, place, own))
+        }
     }
 
     fn sample_each(&self, local: &Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
@@ -197,10 +209,7 @@ impl LightSampler for AdaptiveSampler {
                 *choice = if x < table_width {
                     self.sample_table(local, x)
                 } else {
-                    part.map(|part| {
-                        let (place, own) = self.within(local, &part, x - table_width);
-                        self.choice(local, place, own)
-                    })
+                    part.map(|part| self.within(local, &part, x - table_width))
                 };
             }
         }
@@ -208,24 +217,7 @@ impl LightSampler for AdaptiveSampler {
 
     #[inline]
     fn pmf(&self, local: &Local<'_>, light: u32) -> f32 {
-        let place = self.tree().rank[light as usize];
-        let rest = UNIT - self.table_width();
-        let own = match &local.source {
-            Source::Nothing => return 0.0,
-            Source::Tree(descent) => descent.width_of(place, rest),
-            Source::Cell(cell) => {
-                // Where nothing can arrive nothing is drawn, not by the table either.
-                let Some(part) = cell.part_of(&local.receiver, place, rest >> CELL_SHIFT) else {
-                    return 0.0;
-                };
-                let own = part.width << CELL_SHIFT;
-                match part.branch.light() {
-                    Some(_) => own,
-                    None => self.inside(local).width_in(part.branch.node(), place, own),
-                }
-            }
-        };
-        self.choice(local, place, own).pmf
+        self.chosen(local, light).map_or(0.0, |choice| choice.pmf)
     }
 
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
@@ -239,14 +231,22 @@ impl LightSampler for AdaptiveSampler {
         // First: what new cells believe of visibility is what the whole image has taught so far.
         self.prior.learn(logs);
         let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
-        rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), frame, logs));
+        let lights = Lights {
+            tree: prior.tree(),
+            palette: self.palette.as_ref(),
+        };
+        rayon::join(|| table.learn(logs), || cells.learn(lights, frame, logs));
         self.learn_s += start.elapsed().as_secs_f64();
     }
 
     fn stats(&self) -> SamplerStats {
         let table = self.table.stats();
         SamplerStats {
-            bytes: self.tree().bytes() + table.bytes + self.cells.bytes() + self.schedule.bytes(),
+            bytes: self.tree().bytes()
+                + table.bytes
+                + self.cells.bytes()
+                + self.schedule.bytes()
+                + self.palette.as_ref().map_or(0, Palette::bytes),
             cells: self.cells.len(),
             min_probability: table.min_probability * f64::from(self.table_mass) / 4_294_967_296.0,
             build_s: self.build_s,
@@ -276,8 +276,27 @@ impl AdaptiveSampler {
     fn sample_table(&self, local: &Local<'_>, x: u64) -> Option<Choice> {
         let stretched = (u128::from(x) << 32) / u128::from(self.table_width());
         let light = self.table.sample(&local.table, stretched as u32)?.light;
-        let pmf = self.pmf(local, light);
-        (pmf > 0.0).then_some(Choice { light, pmf })
+        self.chosen(local, light).filter(|choice| choice.pmf > 0.0)
+    }
+
+    /// `light`, as if it had been drawn; `None` where nothing can arrive: nothing is drawn there, not by the table either.
+    #[inline]
+    fn chosen(&self, local: &Local<'_>, light: u32) -> Option<Choice> {
+        let place = self.tree().rank[light as usize];
+        let rest = UNIT - self.table_width();
+        match &local.source {
+            Source::Nothing => None,
+            Source::Tree(descent) => Some(self.choice(local, place, descent.width_of(place, rest))),
+            Source::Cell(cell) => {
+                let part = cell.part_of(&local.receiver, place, rest >> CELL_SHIFT)?;
+                let own = part.width << CELL_SHIFT;
+                let own = match part.branch.light() {
+                    Some(_) => own,
+                    None => self.inside(local).width_in(part.branch.node(), place, own),
+                };
+                Some(self.controlled(local, &part, place, own))
+            }
+        }
     }
 
     /// The light at `place` in tree order, of which `own` is the width that the cell or the tree gives it.
@@ -285,20 +304,31 @@ impl AdaptiveSampler {
     fn choice(&self, local: &Local<'_>, place: u32, own: u64) -> Choice {
         let light = self.tree().light_at(place);
         let of_table = self.table.pmf(&local.table, light) * (self.table_mass as f32 / 4_294_967_296.0);
+        Choice::new(light, probability(own) + of_table)
+    }
+
+    /// The same with the control variate, given the light's entry: what all lights are expected to bring, minus what this one is, over
+    /// its probability. Of what an entry is expected to bring, a light in it has the share with which it is drawn there, so that the mean
+    /// over all draws is zero.
+    #[inline]
+    fn controlled(&self, local: &Local<'_>, part: &Part, place: u32, own: u64) -> Choice {
+        let choice = self.choice(local, place, own);
+        let share = probability(own) / (probability(UNIT - self.table_width()) * choice.pmf);
         Choice {
-            light,
-            pmf: probability(own) + of_table,
+            control: self.cells.unit() * (part.expected.total - part.expected.own * share),
+            ..choice
         }
     }
 
-    /// The light at position `x` (within what the table leaves), given the entry there; returns its place in tree order and its own width.
+    /// The light at position `x` (within what the table leaves), given the entry there.
     #[inline]
-    fn within(&self, local: &Local<'_>, part: &Part, x: u64) -> (u32, u64) {
+    fn within(&self, local: &Local<'_>, part: &Part, x: u64) -> Choice {
         let (start, own) = (part.start << CELL_SHIFT, part.width << CELL_SHIFT);
-        match part.branch.light() {
+        let (place, own) = match part.branch.light() {
             Some(place) => (place, own),
             None => self.inside(local).draw_in(part.branch.node(), x - start, own),
-        }
+        };
+        self.controlled(local, part, place, own)
     }
 
     /// For the inside of a cluster.
@@ -312,6 +342,7 @@ impl AdaptiveSampler {
 mod tests {
     use super::*;
     use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+    use glam::DVec3;
 
     fn learned(scene: &Scene, frames: u32, visible: impl Fn(u32) -> bool) -> AdaptiveSampler {
         let mut sampler = AdaptiveSampler::new(scene, &Settings::default());
@@ -366,6 +397,48 @@ mod tests {
         let before = share(&learned(&scene, 0, visible));
         let after = share(&learned(&scene, 16, visible));
         assert!(before < 0.15 && after > 0.5, "{before} {after}");
+    }
+
+    /// Exactly, over all lights, and not because it is zero.
+    #[test]
+    fn the_control_variate_has_mean_zero() {
+        let mut lights = mixed_lights(200, 3);
+        for (i, light) in lights.iter_mut().enumerate() {
+            light.intensity *= [Vec3::new(1.0, 0.2, 0.1), Vec3::ONE, Vec3::new(0.1, 0.3, 2.0)][i % 3];
+        }
+        let scene = scene_of(lights);
+        let sampler = learned(&scene, 6, |light| light % 3 != 1);
+        let mut controlled = 0;
+        for point in points(64, 9) {
+            let local = sampler.local(&scene, &point);
+            let (mut sum, mut sizes) = (DVec3::ZERO, DVec3::ZERO);
+            for choice in (0..200).filter_map(|light| sampler.chosen(&local, light)) {
+                if choice.pmf > 0.0 {
+                    let weighed = choice.control.as_dvec3() * f64::from(choice.pmf);
+                    sum += weighed;
+                    sizes += weighed.abs();
+                }
+            }
+            assert!((sum.abs() - 2e-5 * sizes).max_element() <= 0.0, "{sum} of {sizes}");
+            controlled += u32::from(sizes.min_element() > 0.0);
+        }
+        assert!(controlled > 16, "{controlled}");
+        let settings = Settings {
+            control_variate: false,
+            ..Settings::default()
+        };
+        let mut without = AdaptiveSampler::new(&scene, &settings);
+        for frame in 0..6 {
+            let logs = observe(&without, &scene, frame, |_| true);
+            without.end_frame(&scene, &logs);
+        }
+        let at = points(1, 9)[0];
+        let local = without.local(&scene, &at);
+        assert!((0..64).all(|i| {
+            without
+                .sample(&local, i << 26)
+                .is_none_or(|choice| choice.control == Vec3::ZERO)
+        }));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! them a few observations of each entry in a cube are enough, with the visible share in the larger cube around it as the prior.
 
 use super::branch::Branch;
-use super::weights::{LANES, Lanes};
+use super::weights::{Factors, LANES, Lanes};
 use crate::Observation;
 use crate::tree::Tree;
 
@@ -17,6 +17,10 @@ pub(super) const LEVELS: u32 = 4;
 const PRIOR_COUNT: f32 = 4.0;
 /// Part of the prior that does not fade, as in the whole cell: what was not visible so far may still be, to few points.
 const LASTING_PRIOR: f32 = 0.03;
+/// With a control variate, by how much the squared weight of an entry that is certain to be visible is reduced. Where visibility V has mean
+/// q, a draw without one brings V with a mean square of q, and with one V - q with a mean square of q (1 - q): higher values trust
+/// that; lower values allow for all else that an entry's contribution varies by.
+const CERTAINTY: f32 = 0.8;
 /// Factors are made anew when the cube has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
 /// No cube yet.
@@ -74,8 +78,10 @@ struct SubCell {
     around: u16,
     /// Of every entry of the cell's cut.
     counts: Vec<Count>,
-    /// By which the entries' weights are multiplied, laid out like them; empty before anything is known.
-    factors: Vec<Lanes>,
+    /// [`Factors::drawn`]; empty before anything is known.
+    drawn: Vec<Lanes>,
+    /// [`Factors::expected`]: visible share here over that in the whole cell.
+    expected: Vec<Lanes>,
     seen: f32,
     built_at: f32,
 }
@@ -89,24 +95,30 @@ impl SubCell {
         self.seen += draws.drawn;
     }
 
-    /// Makes the factors. `whole`: what the whole cell has seen of each entry; `around`: the factors of the cube around this one, empty
-    /// for 1.
-    fn build(&mut self, whole: &[Count], around: &[Lanes]) {
+    /// Makes the factors. `whole`: what the whole cell has seen of each entry; `around`: how much more or less the cube around this one
+    /// expects of each, empty for 1; `certainty`: see [`CERTAINTY`], 0 without a control variate.
+    fn build(&mut self, whole: &[Count], around: &[Lanes], certainty: f32) {
         self.built_at = self.seen;
         let rows = whole.len().div_ceil(LANES);
-        self.factors.clear();
-        self.factors.resize(rows, [1.0; LANES]);
+        for factors in [&mut self.drawn, &mut self.expected] {
+            factors.clear();
+            factors.resize(rows, [1.0; LANES]);
+        }
         for (entry, (own, whole)) in self.counts.iter().zip(whole).enumerate() {
             // As if it had been visible once in half as many draws more: never 0.
             let share = (whole.visible + 0.5) / (whole.drawn + 1.0);
             let (row, lane) = (entry % rows, entry / rows);
-            let factor = around.get(row).map_or(1.0, |row| row[lane]);
-            self.factors[row][lane] = (own.share(share * factor * factor) / share).sqrt();
+            let around = around.get(row).map_or(1.0, |row| row[lane]);
+            let own = own.share(share * around);
+            self.expected[row][lane] = own / share;
+            self.drawn[row][lane] = (own / share * (1.0 - certainty * own.min(1.0))).sqrt();
         }
     }
 
     fn bytes(&self) -> usize {
-        size_of::<Self>() + self.counts.capacity() * size_of::<Count>() + self.factors.capacity() * size_of::<Lanes>()
+        size_of::<Self>()
+            + self.counts.capacity() * size_of::<Count>()
+            + (self.drawn.capacity() + self.expected.capacity()) * size_of::<Lanes>()
     }
 }
 
@@ -123,16 +135,19 @@ struct Layer {
 pub(super) struct SubCells {
     /// Largest first.
     layers: [Layer; LAYERS.len()],
+    certainty: f32,
 }
 
 impl SubCells {
-    pub(super) fn new() -> Self {
+    /// None yet; `controlled`: for a control variate.
+    pub(super) fn new(controlled: bool) -> Self {
         let layer = |bits| Layer {
             numbers: vec![NONE; 1_usize << (3 * bits)],
             subcells: Vec::new(),
         };
         Self {
             layers: LAYERS.map(layer),
+            certainty: if controlled { CERTAINTY } else { 0.0 },
         }
     }
 
@@ -141,15 +156,18 @@ impl SubCells {
         self.layers[LAYERS.len() - 1].subcells.len()
     }
 
-    /// By which the entries' weights are multiplied in a cube, laid out like them; empty for 1.
+    /// By what a cube differs from the cell.
     #[inline]
-    pub(super) fn factors(&self, cube: Cube) -> &[Lanes] {
+    pub(super) fn factors(&self, cube: Cube) -> Factors<'_> {
         for (layer, bits) in self.layers.iter().zip(LAYERS).rev() {
             if let Some(subcell) = layer.subcells.get(usize::from(layer.numbers[cube.within(bits)])) {
-                return &subcell.factors;
+                return Factors {
+                    drawn: &subcell.drawn,
+                    expected: &subcell.expected,
+                };
             }
         }
-        &[]
+        Factors::default()
     }
 
     /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing, if they `may_grow` in number.
@@ -165,7 +183,8 @@ impl SubCells {
                 layer.subcells.push(SubCell {
                     around,
                     counts: vec![Count::default(); entries],
-                    factors: Vec::new(),
+                    drawn: Vec::new(),
+                    expected: Vec::new(),
                     seen: 0.0,
                     built_at: 0.0,
                 });
@@ -182,7 +201,7 @@ impl SubCells {
             for subcell in &mut layer.subcells {
                 if all || subcell.seen >= REBUILD_GROWTH * subcell.built_at {
                     let around = before.get(usize::from(subcell.around));
-                    subcell.build(whole, around.map_or(&[], |subcell| &subcell.factors));
+                    subcell.build(whole, around.map_or(&[], |subcell| &subcell.expected), self.certainty);
                 }
             }
             before = &layer.subcells;
@@ -256,7 +275,7 @@ mod tests {
 
     #[test]
     fn cubes_are_told_apart_and_believe_what_is_around_them() {
-        let mut subcells = SubCells::new();
+        let mut subcells = SubCells::new(false);
         let (lit, dark) = (Cube::at([0, 3, 12]), Cube::at([-1, 3, 12]));
         for (cube, visible) in [(lit, 1.0), (dark, 0.0)] {
             for _ in 0..50 {
@@ -269,8 +288,8 @@ mod tests {
         }
         subcells.refresh(&whole(20), false);
         // 20 entries in two rows.
-        let factor = |cube: Cube, entry: usize| subcells.factors(cube)[entry % 2][entry / 2];
-        assert!(subcells.factors(Cube::at([6, 6, 6])).is_empty());
+        let factor = |cube: Cube, entry: usize| subcells.factors(cube).drawn[entry % 2][entry / 2];
+        assert!(subcells.factors(Cube::at([6, 6, 6])).drawn.is_empty());
         assert!((factor(Cube::at([16, 3, -4]), 17) - 2.0_f32.sqrt()).abs() < 0.05);
         assert!(factor(dark, 17) < 0.1 && factor(dark, 17) > 0.0);
         assert!((factor(dark, 3) - 1.0).abs() < 0.1);
@@ -286,7 +305,7 @@ mod tests {
         let (parts, count) = coarse[0].children(&tree);
         let mut fine = parts[..count].to_vec();
         fine.extend(&coarse[1..]);
-        let mut subcells = SubCells::new();
+        let mut subcells = SubCells::new(false);
         for entry in [0, 0, 1] {
             let draw = Count {
                 drawn: 1.0,

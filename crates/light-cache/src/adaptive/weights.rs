@@ -44,12 +44,39 @@ struct Attenuation {
     inverse_range_sq: Lanes,
 }
 
+/// What entries are expected to bring, by channel, over what they weigh, both without the factors of cubes.
+#[derive(Clone, Debug)]
+#[repr(C, align(64))]
+struct Expected([Lanes; 3]);
+
 /// A cut, ready to be evaluated.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Weights {
     rows: Vec<Row>,
     /// Empty if no entry is attenuated.
     attenuation: Vec<Attenuation>,
+    /// Empty if there is no control variate.
+    expected: Vec<Expected>,
+}
+
+/// An entry of a cut.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Weighed {
+    /// What it stands for.
+    pub(super) branch: Branch,
+    /// What it sends to a point, in proportion to how often it is to be drawn there.
+    pub(super) emitter: Emitter,
+    /// What it is expected to bring, by channel, over that.
+    pub(super) expected: Vec3,
+}
+
+/// By what a place within a cell differs from the cell, entries laid out as in [`Weights`]; both empty for 1.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Factors<'f> {
+    /// How often entries are drawn.
+    pub(super) drawn: &'f [Lanes],
+    /// What they are expected to bring.
+    pub(super) expected: &'f [Lanes],
 }
 
 /// A cut as it is seen from a point: an interval cut in proportion to the weights there.
@@ -57,8 +84,8 @@ pub(super) struct Weights {
 pub(super) struct View<'v> {
     /// The point.
     pub(super) receiver: &'v Receiver,
-    /// By which the weights are multiplied; empty for 1.
-    pub(super) factors: &'v [Lanes],
+    /// By which weights and expectations are multiplied.
+    pub(super) factors: Factors<'v>,
     /// Of the interval, at most 2^52.
     pub(super) width: u64,
 }
@@ -73,7 +100,7 @@ pub(super) enum Wanted {
 }
 
 /// An entry and its part of an interval.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Part {
     /// What the entry stands for.
     pub(super) branch: Branch,
@@ -81,6 +108,17 @@ pub(super) struct Part {
     pub(super) start: u64,
     /// How wide it is.
     pub(super) width: u64,
+    /// What is expected here.
+    pub(super) expected: Expectation,
+}
+
+/// What is expected at a point, by channel, in the units of weights; zero without a control variate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Expectation {
+    /// Of all entries together.
+    pub(super) total: Vec3,
+    /// Of one entry, over its share of the interval.
+    pub(super) own: Vec3,
 }
 
 impl Row {
@@ -103,19 +141,25 @@ impl Row {
 }
 
 impl Weights {
-    /// The cut of `entries`, in tree order; at most as many as a cell may have.
-    pub(super) fn new(entries: &[(Branch, Emitter)]) -> Self {
+    /// The cut of `entries`, in tree order; at most as many as a cell may have. `controlled`: with what is expected of them.
+    pub(super) fn new(entries: &[Weighed], controlled: bool) -> Self {
         let count = entries.len().div_ceil(LANES);
-        let mut rows = Vec::with_capacity(count);
-        let mut attenuation = Vec::new();
-        let attenuated = entries.iter().any(|(_, emitter)| emitter.is_attenuated());
+        let mut weights = Self {
+            rows: Vec::with_capacity(count),
+            ..Self::default()
+        };
+        let attenuated = entries.iter().any(|entry| entry.emitter.is_attenuated());
         for row in 0..count {
-            let of: [(Branch, Emitter); LANES] = std::array::from_fn(|lane| {
+            let of: [Weighed; LANES] = std::array::from_fn(|lane| {
                 let entry = entries.get(lane * count + row).copied();
-                entry.unwrap_or((Branch::ROOT, Emitter::DARK))
+                entry.unwrap_or(Weighed {
+                    branch: Branch::ROOT,
+                    emitter: Emitter::DARK,
+                    expected: Vec3::ZERO,
+                })
             });
-            let lanes = |value: fn(&Emitter) -> f32| of.map(|(_, emitter)| value(&emitter));
-            rows.push(Row {
+            let lanes = |value: fn(&Emitter) -> f32| of.map(|entry| value(&entry.emitter));
+            weights.rows.push(Row {
                 center: [lanes(|e| e.center.x), lanes(|e| e.center.y), lanes(|e| e.center.z)],
                 axis: [lanes(|e| e.axis.x), lanes(|e| e.axis.y), lanes(|e| e.axis.z)],
                 radius: lanes(|e| e.radius),
@@ -126,22 +170,29 @@ impl Weights {
                 isotropic: lanes(|e| e.isotropic),
                 weight: lanes(|e| e.weight),
                 everywhere: lanes(|e| e.everywhere),
-                branch: of.map(|(branch, _)| branch),
+                branch: of.map(|entry| entry.branch),
             });
             if attenuated {
-                attenuation.push(Attenuation {
+                weights.attenuation.push(Attenuation {
                     cone_scale: lanes(|e| e.cone_scale),
                     cone_offset: lanes(|e| e.cone_offset),
                     inverse_range_sq: lanes(|e| e.inverse_range_sq),
                 });
             }
+            if controlled {
+                weights.expected.push(Expected(
+                    [0, 1, 2].map(|channel| of.map(|entry| entry.expected[channel])),
+                ));
+            }
         }
-        Self { rows, attenuation }
+        weights
     }
 
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
-        self.rows.capacity() * size_of::<Row>() + self.attenuation.capacity() * size_of::<Attenuation>()
+        self.rows.capacity() * size_of::<Row>()
+            + self.attenuation.capacity() * size_of::<Attenuation>()
+            + self.expected.capacity() * size_of::<Expected>()
     }
 
     /// For each of `wanted` the part that holds it; `None` if all weights are zero. The weights are worked out once.
@@ -184,66 +235,109 @@ impl Weights {
 
     #[inline(always)]
     fn find_anywhere(&self, view: &View<'_>, wanted: &[Wanted], parts: &mut [Option<Part>]) {
-        let (weights, lanes) = self.evaluate(view.receiver, view.factors);
+        let (weights, lanes, total) = match (self.attenuation.is_empty(), self.expected.is_empty()) {
+            (true, true) => self.evaluate::<false, false>(view),
+            (true, false) => self.evaluate::<false, true>(view),
+            (false, true) => self.evaluate::<true, false>(view),
+            (false, false) => self.evaluate::<true, true>(view),
+        };
         let Some(cut) = Cut::new(&lanes, view.width) else {
             parts.fill(None);
             return;
         };
         for (part, &wanted) in parts.iter_mut().zip(wanted) {
-            *part = Some(self.part(&weights, &cut, wanted));
+            *part = Some(self.part(view, &weights, &cut, total, wanted));
         }
     }
 
     #[inline(always)]
-    fn part(&self, weights: &[Lanes; MAX_ROWS], cut: &Cut, wanted: Wanted) -> Part {
+    fn part(
+        &self,
+        view: &View<'_>,
+        weights: &[Lanes; MAX_ROWS],
+        cut: &Cut,
+        total_expected: Vec3,
+        wanted: Wanted,
+    ) -> Part {
         let lane = match wanted {
             Wanted::At(x) => cut.index_at(x),
             Wanted::Entry(entry) => entry / self.rows.len(),
         };
         let (lane_start, lane_width) = cut.part(lane);
         // A lane without weight is never drawn, but its entries may be asked for.
-        let cut = Cut::new(&column(weights, lane), lane_width);
-        let row = match (wanted, &cut) {
+        let of_lane = Cut::new(&column(weights, lane), lane_width);
+        let row = match (wanted, &of_lane) {
             (Wanted::At(x), Some(cut)) => cut.index_at(x - lane_start),
             (Wanted::At(_), None) => 0,
             (Wanted::Entry(entry), _) => entry % self.rows.len(),
         };
-        let (start, width) = cut.map_or((0, 0), |cut| cut.part(row));
+        let (start, width) = of_lane.map_or((0, 0), |cut| cut.part(row));
+        // The entry's share of the interval is its share of all weights.
+        let own = self.expected.get(row).map_or(Vec3::ZERO, |Expected(channels)| {
+            let per_weight = Vec3::from(channels.map(|lanes| lanes[lane]));
+            let drawn = view.factors.drawn.get(row).map_or(1.0, |lanes| lanes[lane]);
+            let expected = view.factors.expected.get(row).map_or(1.0, |lanes| lanes[lane]);
+            per_weight * (cut.sums[LANES - 1] * expected / drawn)
+        });
         Part {
             branch: self.rows[row].branch[lane],
             start: lane_start + start,
             width,
+            expected: Expectation {
+                total: total_expected,
+                own,
+            },
         }
     }
 
-    /// All weights times `factors`, and the sums of the lanes.
+    /// All weights, the sums of the lanes, and what is expected in all.
     #[inline(always)]
-    fn evaluate(&self, receiver: &Receiver, factors: &[Lanes]) -> ([Lanes; MAX_ROWS], Lanes) {
+    fn evaluate<const ATTENUATED: bool, const CONTROLLED: bool>(
+        &self,
+        view: &View<'_>,
+    ) -> ([Lanes; MAX_ROWS], Lanes, Vec3) {
         let mut all = [[0.0; LANES]; MAX_ROWS];
         let mut lanes = [0.0; LANES];
+        let mut expected = [[0.0; LANES]; 3];
         for (index, (row, weights)) in self.rows.iter().zip(&mut all).enumerate() {
-            let factors = factors.get(index).unwrap_or(&[1.0; LANES]);
+            let drawn = view.factors.drawn.get(index).unwrap_or(&[1.0; LANES]);
+            let brought = view.factors.expected.get(index).unwrap_or(&[1.0; LANES]);
+            let attenuation = ATTENUATED.then(|| &self.attenuation[index]);
+            let per_weight = CONTROLLED.then(|| &self.expected[index].0);
             // One loop over the lanes, so that a row stays in registers until it is done.
-            if let Some(attenuation) = self.attenuation.get(index) {
-                for lane in 0..LANES {
-                    let emitter = Emitter {
-                        cone_scale: attenuation.cone_scale[lane],
-                        cone_offset: attenuation.cone_offset[lane],
-                        inverse_range_sq: attenuation.inverse_range_sq[lane],
-                        ..row.emitter(lane)
-                    };
-                    weights[lane] = emitter.importance::<true>(receiver) * factors[lane];
-                    lanes[lane] += weights[lane];
+            for lane in 0..LANES {
+                let mut emitter = row.emitter(lane);
+                if let Some(attenuation) = attenuation {
+                    emitter.cone_scale = attenuation.cone_scale[lane];
+                    emitter.cone_offset = attenuation.cone_offset[lane];
+                    emitter.inverse_range_sq = attenuation.inverse_range_sq[lane];
                 }
-            } else {
-                for lane in 0..LANES {
-                    weights[lane] = row.emitter(lane).importance::<false>(receiver) * factors[lane];
-                    lanes[lane] += weights[lane];
+                let importance = emitter.importance::<ATTENUATED>(view.receiver);
+                weights[lane] = importance * drawn[lane];
+                lanes[lane] += weights[lane];
+                if let Some(per_weight) = per_weight {
+                    let importance = importance * brought[lane];
+                    for (expected, per_weight) in expected.iter_mut().zip(per_weight) {
+                        expected[lane] += importance * per_weight[lane];
+                    }
                 }
             }
         }
-        (all, lanes)
+        (all, lanes, Vec3::from(expected.map(sum)))
     }
+}
+
+/// The sum of all lanes, by halves: vector instructions, and the same order everywhere.
+#[inline(always)]
+fn sum(mut lanes: Lanes) -> f32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            lanes[i] += lanes[i + half];
+        }
+        half /= 2;
+    }
+    lanes[0]
 }
 
 /// The weights of one lane, zeros after them.
@@ -363,15 +457,19 @@ mod tests {
     #[test]
     fn every_processor_finds_the_same() {
         let tree = Tree::new(&mixed_lights(200, 3));
-        let mut entries = vec![(Branch::DISTANT, Emitter::of(&tree, Branch::DISTANT))];
+        let weighed = |branch| Weighed {
+            branch,
+            emitter: Emitter::of(&tree, branch),
+            expected: Vec3::new(0.5, 0.25, 0.75),
+        };
+        let mut entries = vec![weighed(Branch::DISTANT)];
         for node in (2..tree.nodes.len() as u32)
             .step_by(7)
             .take(super::super::cell::MAX_ENTRIES - 1)
         {
-            let branch = Branch::of_node(&tree, node);
-            entries.push((branch, Emitter::of(&tree, branch)));
+            entries.push(weighed(Branch::of_node(&tree, node)));
         }
-        let weights = Weights::new(&entries);
+        let weights = Weights::new(&entries, true);
         let dimmed: Vec<Lanes> = (0..8)
             .map(|row| std::array::from_fn(|lane| 1.0 / (1 + row * lane) as f32))
             .collect();
@@ -379,7 +477,14 @@ mod tests {
             let receiver = Receiver::from(&point);
             let view = View {
                 receiver: &receiver,
-                factors: if i % 2 == 0 { &[] } else { &dimmed },
+                factors: if i % 2 == 0 {
+                    Factors::default()
+                } else {
+                    Factors {
+                        drawn: &dimmed,
+                        expected: &dimmed,
+                    }
+                },
                 width: WIDTH,
             };
             let x = sampling::Random::new(1, i, 0).u32(0);

@@ -15,7 +15,7 @@ mod interval;
 mod sample;
 mod sampler;
 
-pub(crate) use bounds::{Emission, LeafLight};
+pub(crate) use bounds::{Emission, LeafLight, strength};
 pub(crate) use brightest::CellReceiver;
 pub(crate) use floor::Floor;
 pub(crate) use importance::Receiver;

@@ -50,10 +50,7 @@ impl LightSampler for TreeSampler {
             return None;
         }
         let (place, width) = local.descent.draw(position(u, local.salt), UNIT);
-        Some(Choice {
-            light: self.tree.light_at(place),
-            pmf: probability(width),
-        })
+        Some(Choice::new(self.tree.light_at(place), probability(width)))
     }
 
     #[inline]

@@ -1,5 +1,6 @@
 //! `bench`: how fast the error falls, by scene and sampler.
 
+mod contestants;
 mod plot;
 mod reference;
 mod report;
@@ -14,6 +15,7 @@ use crate::machine::Machine;
 use crate::{message, output, session};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use contestants::{Contestant, Knob};
 use light_cache::SamplerKind;
 use reference::Reference;
 use render::Method;
@@ -30,6 +32,7 @@ Examples:
   manylight bench demo:rooms --samplers uniform,power,table --time 1,4
   manylight bench demo:rooms --samplers tree,adaptive,oracle   how far from the best possible choice?
   manylight bench demo:rooms --scenario walk --samplers tree,adaptive    errors of single frames on the move
+  manylight bench demo:spheres --vary mis --samplers adaptive --time 4      which heuristic is best?
   manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
 
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
@@ -48,6 +51,9 @@ pub(crate) struct BenchArgs {
     /// Samplers to compare; default: all but exact and oracle
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = any_method())]
     samplers: Vec<Method>,
+    /// Compare all values of one knob
+    #[arg(long, value_enum, value_name = "KNOB", conflicts_with = "scenario")]
+    vary: Option<Knob>,
     /// Times at which errors are compared, in seconds; every run lasts as long as the last of them
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "0.1,1,10", value_parser = seconds)]
     time: Vec<f64>,
@@ -125,6 +131,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         return scenario::run(args, scenario, &scenes, &methods, &settings, &cache);
     }
 
+    let contestants = Contestant::all(&settings, &methods, args.vary);
     let mut results = Vec::new();
     let mut interrupted = false;
     for what in &scenes {
@@ -141,16 +148,12 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         };
         let mut runs = Vec::new();
         for seed in 0..args.seeds {
-            let settings = render::Settings {
-                seed: settings.seed + u64::from(seed),
-                ..settings.clone()
-            };
             let what = format!("{what}, run {} of {}", seed + 1, args.seeds);
             runs.extend(Run::all(
                 &loaded.scene,
                 camera,
-                &settings,
-                &methods,
+                &contestants,
+                u64::from(seed),
                 &times,
                 &reference,
                 &watch,
@@ -158,7 +161,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
             )?);
         }
         interrupted = watch.stopped();
-        let result = SceneResult::new(&loaded, &methods, &times, &reference, runs);
+        let result = SceneResult::new(&loaded, &contestants, &times, &reference, runs);
         output::print(&report::table(&result))?;
         results.push(result);
         if interrupted {

@@ -24,7 +24,7 @@ pub(super) fn write_all(folder: &Path, result: &SceneResult) -> Result<()> {
                 .map(|p| (x(p), p.relmse_trimmed))
                 .collect::<Vec<_>>()
         };
-        result.samplers.iter().map(|s| (s.sampler, line(s))).collect()
+        result.samplers.iter().map(|s| (&*s.sampler, line(s))).collect()
     };
     let over_time = lines(
         |point| point.elapsed_s,

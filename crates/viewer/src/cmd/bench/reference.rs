@@ -98,7 +98,6 @@ impl Reference {
         let each = spp.div_ceil(2);
         let mut images = Vec::with_capacity(SEEDS.len());
         for (half, seed) in (1..).zip(SEEDS) {
-            // What only says how to get there is not part of it: all ways have one reference.
             let settings = Settings {
                 method: Method::Exact,
                 seed,
@@ -152,14 +151,20 @@ impl Reference {
 }
 
 /// Names a reference by all that its pixels depend on: the scene's content, the camera, the settings, the version.
+///
+/// What only says how to get there is not part of it: all ways have one reference.
 fn key(scene: &Scene, camera: &Camera, settings: &Settings, spp: u64) -> Result<String> {
     let mut hash = Fnv(0xCBF2_9CE4_8422_2325);
     let parts = &scene.parts;
     let told = write!(
         hash,
-        "{} {spp} {camera:?} {}",
+        "{} {spp} {camera:?} {} {} {} {:?} {}",
         machine::VERSION,
-        serde_json::to_string(settings)?
+        settings.width,
+        settings.height,
+        settings.max_bounces,
+        settings.pixel_filter,
+        settings.seed
     )
     .and_then(|()| {
         write!(hash, "{:?} {:?}", parts.materials, parts.instances)?;

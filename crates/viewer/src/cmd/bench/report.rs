@@ -79,7 +79,7 @@ fn times_table(result: &SceneResult) -> String {
         let times = [s.frame_ms_median, s.frame_ms_p95, s.frame_ms_p99, s.frame_ms_max];
         let shares = [s.learn_share, s.choose_share.unwrap_or(f64::NAN)];
         let ratios = [s.efficiency, s.to_uniform, s.to_tree, s.to_best_other];
-        [s.sampler.to_string(), s.frames.to_string()]
+        [s.sampler.clone(), s.frames.to_string()]
             .into_iter()
             .chain(times.map(number))
             .chain([number(s.light_build_s * 1e3)])
@@ -113,7 +113,7 @@ fn errors_table(result: &SceneResult, noise: bool, show: impl Fn(&Point) -> Stri
         point.map_or("-".into(), &show)
     };
     let row = |s: &SamplerResult| {
-        std::iter::once(s.sampler.to_string())
+        std::iter::once(s.sampler.clone())
             .chain(frames.iter().map(|&at| cell(&s.at_frames, at)))
             .chain(times.iter().map(|&at| cell(&s.at_time, at)))
             .chain(noise.then(|| number(s.at_time.last().map_or(f64::NAN, |point| point.relmse_trimmed_se))))
@@ -159,7 +159,7 @@ pub(super) fn write_all(folder: &Path, machine: &Machine, settings: &Settings, r
                 });
                 let mut row = vec![
                     result.what.clone(),
-                    run.method.name().into(),
+                    run.name.clone(),
                     run.seed.to_string(),
                     (index + 1).to_string(),
                     frame.frame_ms.to_string(),

@@ -1,11 +1,12 @@
 //! Runs of samplers that take turns.
 
+use super::contestants::Contestant;
 use super::reference::Reference;
 use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::session;
 use anyhow::Result;
-use render::{Choosing, FrameLoop, ImageError, Method, Settings};
+use render::{Choosing, FrameLoop, ImageError, Settings};
 use scene::{Camera, Scene};
 use std::time::Instant;
 
@@ -23,8 +24,8 @@ pub(super) struct Frame {
 /// One rendering from scratch.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
-    /// How lights were chosen.
-    pub(super) method: Method,
+    /// [`Contestant::name`].
+    pub(super) name: String,
     /// Seed.
     pub(super) seed: u64,
     /// Seconds of building the light structures.
@@ -47,7 +48,7 @@ struct Active<'s> {
 }
 
 impl Run {
-    /// Renders with every method until the last of `times`. The method that is furthest behind renders the next frame: so
+    /// Renders with every contestant until the last of `times`, its seed being the `nth` after its first. The one that is furthest behind renders the next frame: so
     /// all of them see the same machine, whatever else it does.
     ///
     /// # Errors
@@ -56,19 +57,21 @@ impl Run {
     pub(super) fn all(
         scene: &Scene,
         camera: &Camera,
-        settings: &Settings,
-        methods: &[Method],
+        contestants: &[Contestant],
+        nth: u64,
         times: &[f64],
         reference: &Reference,
         watch: &Watch,
         what: &str,
     ) -> Result<Vec<Self>> {
         let last = *times.last().expect("the command line asks for at least one time");
-        let mut active = Vec::with_capacity(methods.len());
-        for &method in methods {
-            active.push(Active::start(scene, camera, settings, method)?);
+        let mut active = Vec::with_capacity(contestants.len());
+        for contestant in contestants {
+            active.push(Active::start(scene, camera, contestant, nth)?);
         }
-        let pixels = u64::from(settings.width) * u64::from(settings.height);
+        let pixels = contestants.first().map_or(0, |Contestant { settings, .. }| {
+            u64::from(settings.width) * u64::from(settings.height)
+        });
         let mut progress = Progress::new(what);
         while !watch.stopped() {
             let behind = active.iter_mut().filter(|a| a.next_time < times.len());
@@ -102,16 +105,16 @@ impl Run {
 }
 
 impl<'s> Active<'s> {
-    fn start(scene: &'s Scene, camera: &Camera, settings: &Settings, method: Method) -> Result<Self> {
+    fn start(scene: &'s Scene, camera: &Camera, contestant: &Contestant, nth: u64) -> Result<Self> {
         let settings = Settings {
-            method,
-            ..settings.clone()
+            seed: contestant.settings.seed + nth,
+            ..contestant.settings.clone()
         };
         let renderer = session::start(scene, camera, &settings)?;
         let light_build_s = renderer.stats().light_build_s;
         Ok(Self {
             run: Run {
-                method,
+                name: contestant.name.clone(),
                 seed: settings.seed,
                 light_build_s,
                 learn_s: 0.0,

@@ -1,5 +1,6 @@
 //! From runs to figures: medians over seeds, efficiencies.
 
+use super::contestants::Contestant;
 use super::reference::{Facts, Reference};
 use super::run::{Frame, Run};
 use crate::session::Loaded;
@@ -36,8 +37,8 @@ pub(super) struct SceneResult {
 /// What one sampler did on one scene.
 #[derive(Debug, Serialize)]
 pub(super) struct SamplerResult {
-    /// Its name.
-    pub(super) sampler: &'static str,
+    /// Its name, and the value of the knob that is compared if there is one.
+    pub(super) sampler: String,
     /// Number of runs.
     pub(super) seeds: usize,
     /// Frames of a run, median.
@@ -103,13 +104,16 @@ impl SceneResult {
     /// Works out the figures.
     pub(super) fn new(
         loaded: &Loaded,
-        methods: &[Method],
+        contestants: &[Contestant],
         times: &[f64],
         reference: &Reference,
         runs: Vec<Run>,
     ) -> Self {
-        let of = |method: Method| runs.iter().filter(|run| run.method == method).collect::<Vec<_>>();
-        let mut samplers: Vec<_> = methods.iter().map(|&m| SamplerResult::new(m, &of(m), times)).collect();
+        let of = |name: &str| runs.iter().filter(|run| run.name == name).collect::<Vec<_>>();
+        let mut samplers: Vec<_> = contestants
+            .iter()
+            .map(|contestant| SamplerResult::new(contestant, &of(&contestant.name), times))
+            .collect();
         let told = |time: &&f64| {
             let mut points = samplers.iter().map(|s| s.at_time.iter().find(|p| p.at == **time));
             points.all(|point| point.is_some_and(|point| !point.is_noise()))
@@ -168,7 +172,7 @@ fn compare_to_oracle(samplers: &mut [SamplerResult]) {
 }
 
 impl SamplerResult {
-    fn new(method: Method, runs: &[&Run], times: &[f64]) -> Self {
+    fn new(contestant: &Contestant, runs: &[&Run], times: &[f64]) -> Self {
         let mut frame_ms: Vec<f64> = runs
             .iter()
             .flat_map(|run| &run.frames)
@@ -180,7 +184,7 @@ impl SamplerResult {
             .map(|bit| 1usize << bit)
             .take_while(|&count| count <= most);
         Self {
-            sampler: method.name(),
+            sampler: contestant.name.clone(),
             seeds: runs.len(),
             frames: median(runs.iter().map(|run| run.frames.len() as f64).collect()).unwrap_or(0.0) as usize,
             frame_ms_median: quantile(&frame_ms, 0.5),
@@ -191,7 +195,7 @@ impl SamplerResult {
             learn_s: median(runs.iter().map(|run| run.learn_s).collect()).unwrap_or(0.0),
             learn_share: median(runs.iter().map(|run| run.shares().0).collect()).unwrap_or(0.0),
             choose_share: median(runs.iter().filter_map(|run| run.shares().1).collect()),
-            research: method.research_note(),
+            research: contestant.settings.method.research_note(),
             at_time: times
                 .iter()
                 .filter_map(|&time| Point::new(time, runs, |run| run.at_time(time)))
