@@ -9,9 +9,6 @@ use sampling::mis::Heuristic;
 use sampling::{VertexSequence, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 
-/// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
-const SHADOW_RAY_END: f32 = 1.0 - 1.0 / (1 << 18) as f32;
-
 /// A path vertex that wants direct light.
 pub(crate) struct Vertex<'v> {
     pub(crate) surface: &'v Surface,
@@ -283,7 +280,7 @@ impl Connection {
             weight_if_certain,
             irradiance: luminance(point.radiance) * surface.bsdf.normal_ws.dot(point.wi_ws).max(0.0)
                 / point.pdf_solid_angle,
-            shadow_ray: scene.ray_from(surface, point.wi_ws, point.distance * SHADOW_RAY_END),
+            shadow_ray: scene.shadow_ray(surface, point.wi_ws, point.distance),
             to: record.primitive,
         })
     }

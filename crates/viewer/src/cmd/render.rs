@@ -11,8 +11,10 @@ use crate::tev::Display;
 use crate::{machine, message, output, table};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use glam::Vec3;
 use render::image::{self, Channel};
 use render::{Film, Method, RenderStats, Settings};
+use scene::Scene;
 use stats::Stats;
 use std::path::{Path, PathBuf};
 
@@ -172,7 +174,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         }
         Format::Exr => {
             let mut channels = Channel::rgb("", &image).to_vec();
-            layers(&args.aov, frames.film(), &mut channels);
+            layers(&args.aov, frames.film(), &loaded.scene, &mut channels);
             let metadata = metadata(&stats, &settings)?;
             image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
         }
@@ -196,7 +198,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
 }
 
 /// The layers asked for, as channels.
-fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
+fn layers(wanted: &[Aov], film: &Film, scene: &Scene, channels: &mut Vec<Channel>) {
     let one = |name: &str, values: Vec<f32>| Channel {
         name: name.into(),
         values,
@@ -210,7 +212,7 @@ fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
     if wanted.contains(&Aov::Variance) {
         channels.push(one("variance.V", film.variance()));
     }
-    let Some(aovs) = film.aovs() else { return };
+    let Some(mut aovs) = film.aovs() else { return };
     if wanted.contains(&Aov::Albedo) {
         channels.extend(Channel::rgb("albedo", &aovs.albedo));
     }
@@ -218,6 +220,10 @@ fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
         channels.extend(vector("normal", &aovs.normal));
     }
     if wanted.contains(&Aov::Position) {
+        let seen = aovs.position.pixels.iter_mut().zip(&aovs.depth);
+        for (position, _) in seen.filter(|(_, depth)| depth.is_finite()) {
+            *position = scene.parts.in_file(Vec3::from(*position)).as_vec3().to_array();
+        }
         channels.extend(vector("position", &aovs.position));
     }
     if wanted.contains(&Aov::Depth) {

@@ -202,6 +202,12 @@ impl Estimate {
         deviation(self.mean.mean() - expected, self.mean.standard_error(), expected)
     }
 
+    /// The same, differences of up to `tolerance` times what is expected being allowed for.
+    pub(super) fn deviation_beyond(&self, expected: f64, tolerance: f64) -> f64 {
+        let difference = (self.mean.mean() - expected).abs() - tolerance * expected;
+        deviation(difference.max(0.0), self.mean.standard_error(), expected)
+    }
+
     /// How many standard errors the mean is away from that of `other`.
     pub(super) fn deviation_from(&self, other: &Self) -> f64 {
         let error = self.mean.standard_error().hypot(other.mean.standard_error());

@@ -100,8 +100,7 @@ fn sees(scene: &Scene, surface: &Surface, target: Vec3, to: PrimitiveId) -> bool
     if direction.dot(surface.geometric_normal_ws) <= 0.0 {
         return to != PrimitiveId::NONE;
     }
-    // As integrators do it, see `scene::Scene::ray_from`.
-    let ray = scene.ray_from(surface, direction, distance * (1.0 - 1.0 / 262_144.0));
+    let ray = scene.shadow_ray(surface, direction, distance);
     !scene.occluded(&ray, surface.id, to)
 }
 

@@ -9,8 +9,19 @@ use serde::Serialize;
 /// One line per hazard, with the subject that comes closest to the limit or goes furthest beyond; then all that failed.
 pub(super) fn table(checks: &[Check]) -> String {
     let mut rows: Vec<Vec<String>> = Vec::new();
-    for group in checks.chunk_by(|a, b| (a.family, &a.hazard, a.measure) == (b.family, &b.hazard, b.measure)) {
-        let worst = group.iter().max_by(|a, b| strain(a).total_cmp(&strain(b)));
+    let mut groups: Vec<Vec<&Check>> = Vec::new();
+    for check in checks {
+        let alike = |group: &&mut Vec<&Check>| {
+            let first = group[0];
+            (first.family, &first.hazard, first.measure) == (check.family, &check.hazard, check.measure)
+        };
+        match groups.iter_mut().find(alike) {
+            Some(group) => group.push(check),
+            None => groups.push(vec![check]),
+        }
+    }
+    for group in groups {
+        let worst = group.iter().copied().max_by(|a, b| strain(a).total_cmp(&strain(b)));
         let failed = group.iter().filter(|check| !check.passed).count();
         rows.extend(worst.map(|worst| {
             vec![

@@ -5,7 +5,7 @@ use glam::{Affine3A, DVec3, Vec3};
 use light_cache::SamplerKind;
 use render::Method;
 use scene::assemble::{Builder, directional, point, spot};
-use scene::{Camera, Instance, LightKind, Material, Scene, SceneParts};
+use scene::{Camera, LightKind, Material, Scene, SceneParts};
 
 /// The samplers that guarantee every light a probability, so that even a light that nothing points to is drawn in time.
 pub(super) const WITH_FLOOR: [SamplerKind; 5] = [
@@ -99,22 +99,21 @@ pub(super) fn square_lamp(builder: &mut Builder, material: u32) {
     builder.quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X, Vec3::Z, material);
 }
 
-/// The same scene with all lengths times `scale` and then moved by `offset`, radiance kept: a picture of it is the same.
+/// The same scene with all lengths times `scale` and then moved by `offset`, as nodes of files move meshes; radiance kept: a picture of it is the same.
 pub(super) fn transformed(mut parts: SceneParts, scale: f64, offset: DVec3) -> SceneParts {
     let place = |p: Vec3| (p.as_dvec3() * scale + offset).as_vec3();
-    let placed = |instance: &Instance| !instance.identity;
     for (index, mesh) in parts.meshes.iter_mut().enumerate() {
         // A mesh is either in world space or placed by its instances.
-        if parts.instances.iter().any(|i| i.mesh as usize == index && !placed(i)) {
-            mesh.positions.iter_mut().for_each(|p| *p = place(*p));
+        if parts.instances.iter().any(|i| i.mesh as usize == index && i.identity) {
+            mesh.positions.iter_mut().for_each(|p| *p *= scale as f32);
         }
     }
-    for instance in parts.instances.iter_mut().filter(|instance| placed(instance)) {
+    for instance in &mut parts.instances {
         let matrix = instance.world_from_local;
-        let translation = place(matrix.translation.into());
+        let scale = if instance.identity { 1.0 } else { scale as f32 };
         instance.world_from_local = Affine3A {
-            matrix3: matrix.matrix3 * scale as f32,
-            translation: translation.into(),
+            matrix3: matrix.matrix3 * scale,
+            translation: place(matrix.translation.into()).into(),
         };
     }
     for (light, _) in &mut parts.punctual {
