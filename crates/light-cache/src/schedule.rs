@@ -33,7 +33,7 @@ const SURPRISE_PER_WEIGHT: f32 = 0.25;
 const EARLY_FRAMES: u32 = 16;
 
 /// Where a sampler is in the course of its learning.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Schedule {
     /// By how much the end of each later epoch is further than that of the one before; a power of two. Higher values keep more strata;
     /// lower values learn more.

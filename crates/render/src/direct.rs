@@ -91,6 +91,16 @@ pub(crate) trait DirectLight: Sync + Send {
     /// Learns from a frame.
     fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
 
+    /// See [`LightSampler::save`].
+    fn save(&self) -> Option<Vec<u8>> {
+        Some(Vec::new())
+    }
+
+    /// See [`LightSampler::restore`].
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state.is_empty()
+    }
+
     /// What a sampler can tell about itself; `None` if there is none.
     fn sampler_stats(&self) -> Option<SamplerStats> {
         None
@@ -197,6 +207,14 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
 
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]) {
         self.0.end_frame(scene, logs);
+    }
+
+    fn save(&self) -> Option<Vec<u8>> {
+        self.0.save()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        self.0.restore(state)
     }
 
     fn sampler_stats(&self) -> Option<SamplerStats> {

@@ -5,9 +5,11 @@
 //!
 //! A tile owns its pixels, so tiles are rendered in parallel without sharing, and a sample touches one cache line or two.
 
+use crate::RenderError;
 use glam::Vec3;
 use rayon::prelude::*;
 use scene::luminance;
+use serde::{Deserialize, Serialize};
 
 /// Side of a tile in pixels. Higher values make neighbours share more of the caches; lower values balance the work of
 /// many threads better.
@@ -74,7 +76,7 @@ fn luminance_of(r: f64, g: f64, b: f64) -> f64 {
 }
 
 /// Sums of one pixel.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct PixelRecord {
     /// R, G, B, luminance squared, each times the weight of its frame.
     sums: [f64; 4],
@@ -85,7 +87,7 @@ struct PixelRecord {
 }
 
 /// Auxiliary sums of one pixel: albedo, normal, position, emission, depth.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct AovRecord {
     sums: [f64; 13],
     count: u32,
@@ -103,7 +105,7 @@ impl AovRecord {
 }
 
 /// A rectangle of the film.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Tile {
     /// Left column.
     pub(crate) x0: u32,
@@ -157,7 +159,7 @@ impl Tile {
 }
 
 /// Sums of samples per pixel, stored tile by tile so that tiles can be rendered in parallel.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Film {
     width: u32,
     height: u32,
@@ -243,6 +245,50 @@ impl Film {
         }
         self.advance();
         left_out
+    }
+
+    /// Whether the film has the size of `other`, and the same layers.
+    pub(crate) fn is_like(&self, other: &Self) -> bool {
+        let shape = |film: &Self| (film.width, film.height, film.has_aovs);
+        shape(self) == shape(other)
+    }
+
+    /// Adds all samples of `other`: the mean image becomes that of both, each weighed as its frames are.
+    ///
+    /// # Errors
+    /// [`RenderError::State`] if the films differ in size or layers.
+    pub fn merge(&mut self, other: &Self) -> Result<(), RenderError> {
+        if !self.is_like(other) {
+            return Err(RenderError::State {
+                what: "films of different sizes or layers cannot be joined".into(),
+            });
+        }
+        self.frames += other.frames;
+        for (weight, others) in self.weights.iter_mut().zip(other.weights) {
+            *weight += others;
+        }
+        for (tile, others) in self.tiles.iter_mut().zip(&other.tiles) {
+            for (pixel, other) in tile.pixels.iter_mut().zip(&others.pixels) {
+                pixel.count += other.count;
+                pixel.weight += other.weight;
+                pixel
+                    .sums
+                    .iter_mut()
+                    .zip(other.sums)
+                    .for_each(|(sum, other)| *sum += other);
+            }
+            for (pixel, other) in tile.aovs.iter_mut().zip(&others.aovs) {
+                pixel.count += other.count;
+                pixel.hits += other.hits;
+                pixel.light = other.light;
+                pixel
+                    .sums
+                    .iter_mut()
+                    .zip(other.sums)
+                    .for_each(|(sum, other)| *sum += other);
+            }
+        }
+        Ok(())
     }
 
     /// The mean image so far; black before the first frame.

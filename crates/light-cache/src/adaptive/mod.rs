@@ -23,7 +23,7 @@ use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint,
-    TableSampler, TreeVisibleSampler, records,
+    TableSampler, TreeVisibleSampler, records, state,
 };
 use cell::Nearby;
 use cells::Cells;
@@ -42,7 +42,7 @@ const CELL_SHIFT: u32 = 11;
 const EACH: usize = 8;
 
 /// Learned cuts.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct AdaptiveSampler {
     /// The light tree with visibility learned over the whole image: the prior of every cell.
     prior: TreeVisibleSampler,
@@ -241,6 +241,14 @@ impl LightSampler for AdaptiveSampler {
         let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
         rayon::join(|| table.learn(logs), || cells.learn(prior.tree(), frame, logs));
         self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    fn save(&self) -> Option<Vec<u8>> {
+        state::save(self)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state::restore(self, state)
     }
 
     fn stats(&self) -> SamplerStats {
