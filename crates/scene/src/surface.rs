@@ -153,10 +153,11 @@ impl Scene {
         // Short of the light by more than the error of where it is hit: the surface around an emitter lies in its plane.
         const END: f32 = 1.0 - 1.0 / 262_144.0;
         let moved = self.off_surface(surface, wi_ws);
+        // And by as much as it was moved off the surface here, for the same reason: near by, errors are no share of the distance.
         Ray {
             origin_ws: surface.position_ws + moved,
             direction_ws: wi_ws - moved / distance,
-            t_max: distance * END,
+            t_max: (distance * END - moved.length()).max(0.0),
         }
     }
 

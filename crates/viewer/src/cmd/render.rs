@@ -219,9 +219,6 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if let Some(display) = &mut display {
         display.finish(&image);
     }
-    if let Some(path) = args.resume.as_ref().filter(|_| frames.film().spp() > done) {
-        parts::write(path, &header, frames.as_ref())?;
-    }
     let run = frames.stats();
     // Measuring takes about as long as a frame: only where somebody will read the result.
     let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
@@ -238,6 +235,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
             let metadata = metadata(&stats, &settings)?;
             image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
         }
+    }
+    // After the image: what is finished is kept even if there is no room for this.
+    if let Some(path) = args.resume.as_ref().filter(|_| frames.film().spp() > done) {
+        parts::write(path, &header, frames.as_ref())?;
     }
     if let Some(path) = &args.stats {
         let json = serde_json::to_string_pretty(&stats)? + "\n";

@@ -35,7 +35,7 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
             }
             let judge = Judge {
                 scene: &scene,
-                draws: bench.pick(1 << 16, 1 << 20, 1 << 24),
+                draws: bench.pick(1 << 16, 1 << 18, 1 << 24),
             };
             let found = light_cache::build(&scene, &Settings::default(), kind, judge);
             for (state, found) in ["fresh", "taught"].into_iter().zip(found) {

@@ -47,7 +47,7 @@ fn sixty_decades(bench: &mut Bench) -> Result<()> {
     for (name, method) in exact_and(&WITH_FLOOR) {
         for ((camera, &radiance), exponent) in cameras.iter().zip(&radiances).zip(exponents) {
             let shot =
-                Shot::new(&scene, camera, method, (24, 16)).effort(bench.pick(16, 64, 512), bench.pick(8, 16, 16));
+                Shot::new(&scene, camera, method, (24, 16)).effort(bench.pick(16, 40, 512), bench.pick(8, 16, 16));
             let estimate = shot.estimate()?;
             let hazard = format!("1e-30 to 1e30 in one scene, room of 1e{exponent}");
             bench.check(&hazard, name, STANDARD_ERRORS, estimate.deviation(FURNACE * radiance));
@@ -94,7 +94,7 @@ fn one_giant(bench: &mut Bench) -> Result<()> {
     let (scene, cameras) = furnaces(&[Vec3::ONE, Vec3::splat(1e20)])?;
     for (name, method) in exact_and(&WITH_FLOOR) {
         let shot =
-            Shot::new(&scene, &cameras[0], method, (24, 16)).effort(bench.pick(16, 64, 256), bench.pick(8, 16, 16));
+            Shot::new(&scene, &cameras[0], method, (24, 16)).effort(bench.pick(16, 40, 256), bench.pick(8, 16, 16));
         let estimate = shot.estimate()?;
         let hazard = "hidden lights 1e20 times as strong";
         bench.check(hazard, name, STANDARD_ERRORS, estimate.deviation(FURNACE));
@@ -126,7 +126,7 @@ fn saturated(bench: &mut Bench) -> Result<()> {
     for (channel, color) in [("red", Vec3::X), ("green", Vec3::Y), ("blue", Vec3::Z)] {
         let (scene, cameras) = furnaces(&[color * 100.0])?;
         for (name, method) in methods() {
-            let mut shot = Shot::new(&scene, &cameras[0], method, (16, 12)).effort(bench.pick(16, 64, 256), 8);
+            let mut shot = Shot::new(&scene, &cameras[0], method, (16, 12)).effort(bench.pick(16, 24, 256), 8);
             shot.settings.max_bounces = 6;
             let estimate = shot.estimate()?;
             let expected = (0..8).map(|n| 0.5_f64.powi(n)).sum::<f64>() * f64::from(luminance(color * 100.0));

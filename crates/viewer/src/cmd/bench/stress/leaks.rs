@@ -15,7 +15,7 @@ const BATCH: u32 = 10_000;
 
 /// Checks the family.
 pub(super) fn check(bench: &mut Bench) -> Result<()> {
-    let rays = bench.pick(100_000, 3_000_000, 100_000_000 / 12_u32);
+    let rays = bench.pick(100_000, 1_000_000, 100_000_000 / 12_u32);
     let far = DVec3::new(1e5, -1e5, 1e5);
     let places = [
         ("", 1.0, DVec3::ZERO),

@@ -45,11 +45,14 @@ fn seen_triangle(random: Random, solid_angle: f64) -> [Vec3; 3] {
     ]
 }
 
-/// By how much rounding the corners of a triangle can change its solid angle, relative to it: large for needles and for triangles seen
-/// edge-on, 1 for compact ones.
+/// By how much rounding the corners of a triangle can change its solid angle, relative to it: large for needles, for triangles seen edge-on,
+/// and for those of which an edge passes close by; 1 for compact ones.
 fn condition([a, b, c]: [Vec3; 3]) -> f64 {
-    let [a, edge1, edge2] = [a, b - a, c - a].map(Vec3::as_dvec3);
-    a.length() * edge1.length() * edge2.length() / a.dot(edge1.cross(edge2)).abs()
+    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
+    let (edge1, edge2) = (b - a, c - a);
+    let flat = a.length() * edge1.length() * edge2.length() / a.dot(edge1.cross(edge2)).abs();
+    let passing = |p: DVec3, q: DVec3| 2.0 / (1.0 + p.normalize().dot(q.normalize()));
+    flat.max(passing(a, b)).max(passing(b, c)).max(passing(c, a))
 }
 
 /// Largest deviations of solid angles.
