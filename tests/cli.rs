@@ -2,6 +2,7 @@
 
 mod measuring;
 mod sampling;
+mod state;
 
 use serde_json::{Value, json};
 use std::io::Read;

@@ -46,7 +46,7 @@ fn furnace() {
         ..Material::lambert("wall", Vec3::splat(albedo as f32))
     });
     builder.room(Vec3::new(-1.0, -1.0, -1.0), Vec3::new(2.0, 1.0, 1.5), wall);
-    let scene = builder.build();
+    let scene = builder.build().expect("the scene is valid");
     assert_eq!(scene.lights.len(), 12, "each emissive triangle is a light");
     let camera = Camera::look_at(
         "inside",
@@ -98,7 +98,9 @@ fn nothing_reflects_more_than_it_receives() {
         builder.quad(Vec3::new(-0.5, 0.0, -0.5), Vec3::Z, Vec3::X, white);
         let camera = meter(Vec3::new(0.0, 1.5, 1.0), Vec3::ZERO, 0.3);
         let plan = Plan::new(Method::Exact, 4, 4).effort(64, 16);
-        let seen = Case::new(&builder.build(), &camera, plan).estimate().mean;
+        let seen = Case::new(&builder.build().expect("the scene is valid"), &camera, plan)
+            .estimate()
+            .mean;
         assert!(
             seen.mean() <= 1.0 + 4.0 * seen.standard_error() + 1e-4,
             "{name} returns {}",
@@ -140,7 +142,7 @@ fn square_lamp_has_its_form_factor() {
         let irradiance = 7.0 * polygon_irradiance(&vertices.map(|v| v.as_dvec3()), DVec3::Y);
         let expected = irradiance * f64::from(albedo) / std::f64::consts::PI;
         let camera = meter(Vec3::new(-3.0, 0.15, 0.5), Vec3::ZERO, 1e-4);
-        let scene = builder.build();
+        let scene = builder.build().expect("the scene is valid");
         for method in few_methods() {
             let plan = Plan::new(method, 2, 2).effort(256, 16);
             assert_radiance(
@@ -174,7 +176,7 @@ fn a_lamp_shines_forward_only_unless_it_is_double_sided() {
             let expected = if double_sided { lit } else { 0.0 };
             assert_radiance(
                 &format!("double-sided {double_sided}, {}", method.name()),
-                &builder.build(),
+                &builder.build().expect("the scene is valid"),
                 &camera,
                 &plan,
                 expected,
@@ -196,7 +198,7 @@ fn assert_ground(what: &str, light: scene::Light, irradiance: f64) {
         let plan = Plan::new(method, 2, 2).effort(4, 4);
         assert_radiance(
             &format!("{what}, {}", method.name()),
-            &builder.build(),
+            &builder.build().expect("the scene is valid"),
             &camera,
             &plan,
             expected,
@@ -250,7 +252,7 @@ fn emission_is_radiance() {
     let mut builder = Builder::default();
     let lamp = builder.material(Material::emitter("lamp", Vec3::splat(3.25)));
     builder.quad(Vec3::new(-1.0, -1.0, 0.0), Vec3::X * 2.0, Vec3::Y * 2.0, lamp);
-    let scene = builder.build();
+    let scene = builder.build().expect("the scene is valid");
     for (z, expected) in [(2.0, 3.25), (-2.0, 0.0)] {
         let camera = meter(Vec3::new(0.1, 0.2, z), Vec3::ZERO, 0.5);
         for method in few_methods() {

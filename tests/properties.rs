@@ -19,7 +19,10 @@ fn still_life_plan(seed: u64) -> Plan {
 
 /// Asserts that `scene` seen by `camera` looks like the still life.
 fn assert_looks_like_still_life(what: &str, scene: &Scene, camera: &Camera) {
-    let (original, its_camera) = (still_life(1.0).build(), still_life_camera(1.0));
+    let (original, its_camera) = (
+        still_life(1.0).build().expect("the scene is valid"),
+        still_life_camera(1.0),
+    );
     let original = Case::new(&original, &its_camera, still_life_plan(0)).measure();
     assert_same(what, &Case::new(scene, camera, still_life_plan(1000)), &original);
 }
@@ -27,7 +30,10 @@ fn assert_looks_like_still_life(what: &str, scene: &Scene, camera: &Camera) {
 /// The comparison that the tests here rely on is sharp: one of several lamps a tenth dimmer does not pass.
 #[test]
 fn a_dimmer_lamp_is_noticed() {
-    let (original, camera) = (still_life(1.0).build(), still_life_camera(1.0));
+    let (original, camera) = (
+        still_life(1.0).build().expect("the scene is valid"),
+        still_life_camera(1.0),
+    );
     let mut parts = still_life(1.0).parts();
     parts.punctual[0].0.intensity *= 0.9;
     let dimmer = Scene::new(parts).expect("the scene is valid");
@@ -54,15 +60,18 @@ fn a_lamp_cut_in_four_shines_alike() {
             builder.quad(Vec3::new(x - 1.0, 3.0, z - 1.0), Vec3::X * 0.5, Vec3::Z * 0.5, material);
         }
     });
-    let cut = cut.build();
-    assert_eq!(cut.lights.len(), still_life(1.0).build().lights.len() + 6);
+    let cut = cut.build().expect("the scene is valid");
+    assert_eq!(
+        cut.lights.len(),
+        still_life(1.0).build().expect("the scene is valid").lights.len() + 6
+    );
     assert_looks_like_still_life("lamp in four", &cut, &still_life_camera(1.0));
 }
 
 #[test]
 fn the_unit_of_length_does_not_matter() {
     for scale in [1e-3, 1e4] {
-        let scaled = still_life(scale).build();
+        let scaled = still_life(scale).build().expect("the scene is valid");
         assert_looks_like_still_life(&format!("scaled by {scale}"), &scaled, &still_life_camera(scale));
     }
 }
@@ -76,7 +85,7 @@ fn black_lights_are_no_lights() {
     builder.quad(Vec3::Y, Vec3::X, Vec3::Z, black);
     builder.light(point(Vec3::Y, Vec3::ZERO));
     builder.light(point(Vec3::Y * 2.0, Vec3::ONE));
-    let scene = builder.build();
+    let scene = builder.build().expect("the scene is valid");
     assert_eq!(scene.lights.len(), 1, "only the one that shines is left");
     assert!(scene.lights[0].intensity == Vec3::ONE);
 }
@@ -88,7 +97,7 @@ fn without_lights_all_is_black() {
     let floor = dark.material(Material::lambert("floor", Vec3::ONE));
     ground(&mut dark, floor);
     let empty = Scene::new(SceneParts::default()).expect("nothing is a valid scene");
-    for (name, scene) in [("empty", &empty), ("dark", &dark.build())] {
+    for (name, scene) in [("empty", &empty), ("dark", &dark.build().expect("the scene is valid"))] {
         for method in Method::all() {
             let settings = Settings {
                 width: 8,
@@ -252,7 +261,11 @@ fn probabilities_are_what_is_drawn() {
         let scene = scene::load(&format!("demo:{name}")).expect("the scene is known");
         check_probabilities(name, &scene, &scene.parts.cameras[0]);
     }
-    check_probabilities("still life", &still_life(1.0).build(), &still_life_camera(1.0));
+    check_probabilities(
+        "still life",
+        &still_life(1.0).build().expect("the scene is valid"),
+        &still_life_camera(1.0),
+    );
 }
 
 /// Checks that the only light is certain.
@@ -281,7 +294,7 @@ fn the_only_light_is_certain() {
     let floor = builder.material(Material::lambert("floor", Vec3::ONE));
     ground(&mut builder, floor);
     builder.light(point(Vec3::Y * 2.0, Vec3::ONE));
-    let scene = builder.build();
+    let scene = builder.build().expect("the scene is valid");
     for kind in SamplerKind::ALL {
         light_cache::build(&scene, &light_cache::Settings::default(), kind, OnlyLight(&scene));
     }

@@ -86,5 +86,9 @@ fn one_light() {
 
 #[test]
 fn lights_of_every_kind() {
-    check_scene("still life", &still_life(1.0).build(), &still_life_camera(1.0));
+    check_scene(
+        "still life",
+        &still_life(1.0).build().expect("the scene is valid"),
+        &still_life_camera(1.0),
+    );
 }

@@ -18,7 +18,7 @@ const LEAST: f32 = 0.1;
 const SPIKE: f32 = 100.0;
 
 /// Mean contribution of light by place.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Brightness {
     cells: Vec<(f32, f32)>,
     cells_per_metre: f32,

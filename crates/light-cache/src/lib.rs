@@ -17,6 +17,7 @@ mod power;
 mod records;
 mod schedule;
 pub mod settings;
+mod state;
 mod table;
 #[cfg(test)]
 mod testing;
@@ -40,7 +41,7 @@ pub use tree_visible::TreeVisibleSampler;
 pub use uniform::UniformSampler;
 
 /// What a sampler may know about the point that wants light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct ShadingPoint {
     /// World position.
     pub position_ws: Vec3,
@@ -74,7 +75,7 @@ impl Choice {
 }
 
 /// What an eye-path vertex found out about a light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Observation {
     /// Where.
     pub point: ShadingPoint,
@@ -235,6 +236,18 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// Learns from a frame, or keeps it for later. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
+
+    /// All that it has learned, so that [`LightSampler::restore`] makes a sampler of the same scene and settings go on to the bit as this one
+    /// would. `None` if it cannot be told; nothing for samplers that do not learn.
+    fn save(&self) -> Option<Vec<u8>> {
+        (!Self::LEARNS).then(Vec::new)
+    }
+
+    /// Takes over what [`LightSampler::save`] has told. Returns whether it could be read; if not, nothing has changed. Bytes that were
+    /// damaged on the way may be taken for something else: check them before.
+    fn restore(&mut self, state: &[u8]) -> bool {
+        !Self::LEARNS && state.is_empty()
+    }
 
     /// What it can tell about itself.
     fn stats(&self) -> SamplerStats;

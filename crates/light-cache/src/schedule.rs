@@ -33,7 +33,7 @@ const SURPRISE_PER_WEIGHT: f32 = 0.25;
 const EARLY_FRAMES: u32 = 16;
 
 /// Where a sampler is in the course of its learning.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Schedule {
     /// By how much the end of each later epoch is further than that of the one before; a power of two. Higher values keep more strata;
     /// lower values learn more.
@@ -104,8 +104,9 @@ impl Schedule {
             self.lessons = self.lessons.wrapping_add(1);
             return Some(Cow::Borrowed(logs));
         }
-        self.kept
-            .extend((0..).zip(logs).map(|(tile, log)| thinned(log, weight, [frame, tile])));
+        // Most tiles of a long epoch's frame leave nothing: even an empty list each would fill the memory in the end.
+        let kept = (0..).zip(logs).map(|(tile, log)| thinned(log, weight, [frame, tile]));
+        self.kept.extend(kept.filter(|log| !log.is_empty()));
         if self.frame < epoch.end {
             return None;
         }
@@ -115,7 +116,8 @@ impl Schedule {
 
     /// Bytes held.
     pub(crate) fn bytes(&self) -> usize {
-        self.kept.iter().map(|log| size_of_val(&log[..])).sum()
+        let of_log = |log: &Vec<Observation>| size_of_val(log) + size_of_val(&log[..]);
+        self.kept.iter().map(of_log).sum()
     }
 }
 

@@ -11,7 +11,9 @@
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;
 use crate::schedule::Schedule;
-use crate::{Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint, records};
+use crate::{
+    Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint, records, state,
+};
 use glam::Vec3;
 use sampling::Discrete;
 use scene::{Light, Scene};
@@ -29,7 +31,7 @@ const MEMORY: f64 = 65_536.0;
 const MIN_SAMPLES_TO_IGNORE: f64 = 32.0;
 
 /// The table as a sampler: position plays no part, first hits and later hits have tables of their own.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct TableSampler {
     primary: Table,
     /// Like the primary one until a later hit has been seen.
@@ -50,7 +52,7 @@ pub struct TableSampler {
 }
 
 /// What is known about one light.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Entry {
     samples: f64,
     /// How many of them saw it.
@@ -63,7 +65,7 @@ struct Entry {
 }
 
 /// One importance table.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Table {
     entries: Vec<Entry>,
     /// `None` if there are no lights.
@@ -311,6 +313,14 @@ impl LightSampler for TableSampler {
         if let Some(logs) = self.schedule.end_frame(logs) {
             self.learn(&logs);
         }
+    }
+
+    fn save(&self) -> Option<Vec<u8>> {
+        state::save(self)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state::restore(self, state)
     }
 
     fn stats(&self) -> SamplerStats {

@@ -10,10 +10,10 @@
 
 mod visibility;
 
-use crate::records;
 use crate::schedule::Schedule;
 use crate::tree::{Descent, Floor, Tree, position, probability};
 use crate::{Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint};
+use crate::{records, state};
 use glam::Vec3;
 use scene::{Light, Scene};
 use std::time::Instant;
@@ -29,7 +29,7 @@ const OBSERVATIONS_TO_REGROUP: usize = 4;
 const EPOCH_GROWTH: u32 = 16;
 
 /// The light tree, leaf flux times learned visibility.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct TreeVisibleSampler {
     tree: Tree,
     visibility: Visibility,
@@ -193,6 +193,14 @@ impl LightSampler for TreeVisibleSampler {
             self.visibility.apply(&mut self.tree);
         }
         self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    fn save(&self) -> Option<Vec<u8>> {
+        state::save(self)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state::restore(self, state)
     }
 
     fn stats(&self) -> SamplerStats {

@@ -10,9 +10,6 @@ use sampling::{VertexSequence, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
 use std::f32::consts::FRAC_1_PI;
 
-/// Shadow rays end this share of their length before the light, so that the surface around an emitter, which lies in its plane, is not met.
-const SHADOW_RAY_END: f32 = 1.0 - 1.0 / (1 << 18) as f32;
-
 /// A path vertex that wants direct light.
 pub(crate) struct Vertex<'v> {
     pub(crate) surface: &'v Surface,
@@ -94,6 +91,16 @@ pub(crate) trait DirectLight: Sync + Send {
 
     /// Learns from a frame.
     fn end_frame(&mut self, _scene: &Scene, _logs: &[Vec<Observation>]) {}
+
+    /// See [`LightSampler::save`].
+    fn save(&self) -> Option<Vec<u8>> {
+        Some(Vec::new())
+    }
+
+    /// See [`LightSampler::restore`].
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state.is_empty()
+    }
 
     /// What a sampler can tell about itself; `None` if there is none.
     fn sampler_stats(&self) -> Option<SamplerStats> {
@@ -205,6 +212,14 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         self.0.end_frame(scene, logs);
     }
 
+    fn save(&self) -> Option<Vec<u8>> {
+        self.0.save()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        self.0.restore(state)
+    }
+
     fn sampler_stats(&self) -> Option<SamplerStats> {
         Some(self.0.stats())
     }
@@ -286,7 +301,7 @@ impl Connection {
             weight_if_certain,
             irradiance: luminance(point.radiance) * surface.bsdf.normal_ws.dot(point.wi_ws).max(0.0)
                 / point.pdf_solid_angle,
-            shadow_ray: scene.ray_from(surface, point.wi_ws, point.distance * SHADOW_RAY_END),
+            shadow_ray: scene.shadow_ray(surface, point.wi_ws, point.distance),
             to: record.primitive,
         })
     }

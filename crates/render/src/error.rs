@@ -14,6 +14,12 @@ pub enum RenderError {
         /// What to do.
         remedy: String,
     },
+    /// A rendering could not be stopped, continued or divided.
+    #[error("{what}")]
+    State {
+        /// Why not.
+        what: String,
+    },
     /// An image file could not be read.
     #[error("{path}: cannot read image: {reason}")]
     Read {

@@ -14,6 +14,9 @@ use sampling::PixelSampler;
 use sampling::mis::Heuristic;
 use scene::camera::CameraRays;
 use scene::{Camera, Scene};
+use state::State;
+pub use state::film_of;
+use std::borrow::Cow;
 use std::ops::{Add, Deref};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -109,6 +112,31 @@ pub trait FrameLoop<'s>: Send {
     /// # Errors
     /// [`RenderError::Setting`] if there are more or fewer lights.
     fn set_scene(&mut self, scene: SceneRef<'s>) -> Result<(), RenderError>;
+
+    /// The whole state: film, counters and what was learned, for [`FrameLoop::restore`].
+    ///
+    /// # Errors
+    /// [`RenderError::State`] if this renderer cannot tell its state.
+    fn save(&self) -> Result<Vec<u8>, RenderError> {
+        Err(state::unable())
+    }
+
+    /// Takes over what [`FrameLoop::save`] has told, in a rendering of the same scene, camera and settings: it goes on to the bit as the other
+    /// would have. Bytes that were damaged on the way may be taken for something else: check them before.
+    ///
+    /// # Errors
+    /// [`RenderError::State`] if the bytes are no such state, or if this renderer cannot take one over.
+    fn restore(&mut self, _state: &[u8]) -> Result<(), RenderError> {
+        Err(state::unable())
+    }
+
+    /// Leaves out the next `count` frames: their random numbers are for somebody else, who renders them.
+    ///
+    /// # Errors
+    /// [`RenderError::State`] if this renderer cannot.
+    fn skip_frames(&mut self, _count: u32) -> Result<(), RenderError> {
+        Err(state::unable())
+    }
 
     /// Counters so far.
     fn stats(&self) -> RenderStats;
@@ -245,6 +273,12 @@ pub(crate) trait Frames: Send {
     /// What a sampler can tell about itself; `None` if there is none.
     fn sampler_stats(&self) -> Option<SamplerStats>;
 
+    /// The frame with which the current sequence of random numbers began, and what was learned; `None` if that cannot be told.
+    fn save(&self) -> Option<(u32, Vec<u8>)>;
+
+    /// Takes over what [`Frames::save`] has told; returns whether it could.
+    fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool;
+
     /// See [`FrameLoop::light_records`].
     fn light_records(&self, scene: &Scene) -> Vec<LightRecord>;
 
@@ -324,6 +358,15 @@ impl<D: DirectLight> Frames for Drawn<D> {
 
     fn sampler_stats(&self) -> Option<SamplerStats> {
         self.direct.sampler_stats()
+    }
+
+    fn save(&self) -> Option<(u32, Vec<u8>)> {
+        Some((self.first_frame, self.direct.save()?))
+    }
+
+    fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool {
+        self.first_frame = first_frame;
+        self.direct.restore(learned)
     }
 
     fn light_records(&self, scene: &Scene) -> Vec<LightRecord> {
@@ -467,6 +510,37 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
         Ok(())
     }
 
+    fn save(&self) -> Result<Vec<u8>, RenderError> {
+        let (first_frame, learned) = self.frames.save().ok_or_else(state::unable)?;
+        let state = State {
+            film: Cow::Borrowed(&self.film),
+            frame: self.eye.frame,
+            first_frame,
+            learned,
+            counters: self.counters,
+            render_s: self.render_s,
+        };
+        state.to_bytes()
+    }
+
+    fn restore(&mut self, state: &[u8]) -> Result<(), RenderError> {
+        let state = State::from_bytes(state)?;
+        let same_film = state.film.is_like(&self.film);
+        if !same_film || !self.frames.restore(state.first_frame, &state.learned) {
+            return Err(state::unlike());
+        }
+        self.film = state.film.into_owned();
+        self.eye.frame = state.frame;
+        self.counters = state.counters;
+        self.render_s = state.render_s;
+        Ok(())
+    }
+
+    fn skip_frames(&mut self, count: u32) -> Result<(), RenderError> {
+        self.eye.frame = self.eye.frame.wrapping_add(count);
+        Ok(())
+    }
+
     fn stats(&self) -> RenderStats {
         let sampler = self.frames.sampler_stats();
         let mut skipped = sampler.as_ref().map_or_else(Vec::new, |s| s.skipped.clone());
@@ -513,5 +587,6 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     }
 }
 
+mod state;
 #[cfg(test)]
 mod tests;

@@ -116,6 +116,15 @@ impl Frames for Oracle {
         self.prepare_s
     }
 
+    /// What it knows is worked out anew from scene and settings.
+    fn save(&self) -> Option<(u32, Vec<u8>)> {
+        Some((0, Vec::new()))
+    }
+
+    fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool {
+        first_frame == 0 && learned.is_empty()
+    }
+
     fn sampler_stats(&self) -> Option<SamplerStats> {
         Some(SamplerStats {
             bytes: self.tiles.iter().flatten().map(Pixel::bytes).sum(),

@@ -66,7 +66,7 @@ impl<D> FrameView<'_, D> {
 }
 
 /// What is counted.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Counters {
     pub(crate) rays_nearest: u64,
     pub(crate) rays_occluded: u64,

@@ -38,7 +38,7 @@ fn pmf_of(mass: u64) -> f32 {
 /// Drawing inverts the cumulative masses with a guide table (Chen and Asau, "On Generating Random Variates from an
 /// Empirical Distribution", 1974): expected constant time, and monotone in the random number, so that stratified
 /// numbers draw stratified entries. An alias table would be as fast and destroy the strata.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Discrete {
     /// First value of each entry. An entry of mass 0 starts where the next one does.
     start: Vec<u32>,

@@ -10,6 +10,11 @@ use std::f32::consts::{FRAC_1_PI, PI};
 /// Least GGX alpha: smoother surfaces are rendered as this smooth (a lobe of 0.06 degrees), so that values and densities stay finite.
 pub const MIN_ALPHA: f32 = 1e-3;
 
+/// Most that the diffuse lobe is enlarged by at a pair of angles to make up for others. Under a coat that reflects nearly everything the mean
+/// of what passes is nearly nothing, and at grazing angles, where a little more passes, the quotient would be thousands. Higher values keep a
+/// white base whiter under such coats; lower values bound the weights of samples.
+const MOST_COUPLING: f32 = 2.0;
+
 /// A material at one surface point: numbers only. Directions are unit, world space, and point away from the surface;
 /// `normal_ws` is the shading normal on the side of `wo`.
 ///
@@ -145,7 +150,7 @@ impl Bsdf {
         let (passing_o, passing_i, mean) = (1.0 - albedo_o, 1.0 - albedo.at(cos_i), 1.0 - albedo.mean());
         // A mirror lets nothing pass: no share of nothing.
         let coupling = if mean > 1e-6 {
-            (passing_i * passing_o).max(0.0) / mean
+            ((passing_i * passing_o).max(0.0) / mean).min(MOST_COUPLING)
         } else {
             0.0
         };

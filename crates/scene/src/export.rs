@@ -10,7 +10,7 @@ mod material;
 use crate::{LightKind, SceneError, SceneParts, file};
 use document::{BufferView, Document, LightIndex, Node, NodeExtensions};
 use geometry::{Geometry, Packed};
-use glam::{Affine3A, Quat, Vec3};
+use glam::{Affine3A, DVec3, Quat, Vec3};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::io;
@@ -77,7 +77,18 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
     lights(parts, &mut document);
     document.extensions_used = extensions_used(&document);
     document.scenes[0].name.clone_from(&parts.name);
-    document.scenes[0].nodes = (0..document.nodes.len() as u32).collect();
+    let all = 0..document.nodes.len() as u32;
+    document.scenes[0].nodes = if parts.origin_ws == DVec3::ZERO {
+        all.collect()
+    } else {
+        // Back to where the scene came from.
+        document.nodes.push(Node {
+            translation: Some(parts.origin_ws.as_vec3().to_array()),
+            children: all.clone().collect(),
+            ..Node::default()
+        });
+        vec![all.end]
+    };
 
     let mut text = serde_json::to_vec(&document)?;
     pad(&mut text, b' ');

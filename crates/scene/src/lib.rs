@@ -7,6 +7,7 @@
 //! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
+pub mod assemble;
 pub mod bsdf;
 pub mod bvh;
 pub mod camera;
@@ -20,6 +21,7 @@ pub mod instance;
 pub mod light;
 pub mod material;
 pub mod mesh;
+mod recentre;
 mod relight;
 pub mod report;
 mod scene;

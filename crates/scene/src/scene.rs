@@ -3,13 +3,14 @@
 use crate::bvh::{Bvh, PACKET, Packet};
 use crate::inputs::Inputs;
 use crate::light::collect::{Collected, collect};
+use crate::recentre::recentre;
 use crate::shading::Shading;
 use crate::validate::{texture_refs, validate};
 use crate::{
     Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report,
     SceneError, Texture,
 };
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::path::Path;
 use std::sync::Arc;
@@ -36,6 +37,9 @@ pub struct SceneParts {
     pub cameras: Vec<Camera>,
     /// What was found on the way.
     pub report: Report,
+    /// Where the zero of all positions here lies in the file, metres. Scenes that lie far from zero for their size are moved there, because
+    /// single precision has no digits for both; add it to positions that people or other programs see.
+    pub origin_ws: DVec3,
 }
 
 /// A scene ready for rendering.
@@ -107,6 +111,7 @@ impl Scene {
     /// Lesser faults are repaired, with a line in the report.
     pub fn new(mut parts: SceneParts) -> Result<Self, SceneError> {
         validate(&mut parts)?;
+        recentre(&mut parts);
         let mut shading = Shading::new(&parts).ok_or_else(|| SceneError::Invalid {
             path: parts.name.clone().into(),
             place: "scene".into(),
@@ -273,7 +278,7 @@ impl Scene {
 
 /// Centre and radius of the sphere around the bounding box of everything placed, in f64 on the way: squares of large
 /// coordinates, and differences of close ones.
-fn bounding_sphere(parts: &SceneParts) -> (Vec3, f32) {
+pub(crate) fn bounding_sphere(parts: &SceneParts) -> (Vec3, f32) {
     let nothing = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
     // Vertices that no triangle uses do not count.

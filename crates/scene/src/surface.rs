@@ -138,15 +138,37 @@ impl Scene {
     /// origin a share of the scene's radius instead of a constant in metres, so that a scaled scene gives the same image.
     #[inline]
     pub fn ray_from(&self, surface: &Surface, wi_ws: Vec3, t_max: f32) -> Ray {
+        Ray {
+            origin_ws: surface.position_ws + self.off_surface(surface, wi_ws),
+            direction_ws: wi_ws,
+            t_max,
+        }
+    }
+
+    /// A ray that leaves `surface` as [`Scene::ray_from`] does and ends short of the point at `distance` along `wi_ws`, to which it is
+    /// aimed from where it starts: one that kept its direction would pass beside the point by as much as its origin was moved, and
+    /// could be stopped by what lies next to the light. Its direction is a unit vector to within that shift.
+    #[inline]
+    pub fn shadow_ray(&self, surface: &Surface, wi_ws: Vec3, distance: f32) -> Ray {
+        // Short of the light by more than the error of where it is hit: the surface around an emitter lies in its plane.
+        const END: f32 = 1.0 - 1.0 / 262_144.0;
+        let moved = self.off_surface(surface, wi_ws);
+        // And by as much as it was moved off the surface here, for the same reason: near by, errors are no share of the distance.
+        Ray {
+            origin_ws: surface.position_ws + moved,
+            direction_ws: wi_ws - moved / distance,
+            t_max: (distance * END - moved.length()).max(0.0),
+        }
+    }
+
+    /// From a surface point to where a ray towards `wi_ws` starts, see [`Scene::ray_from`].
+    #[inline]
+    fn off_surface(&self, surface: &Surface, wi_ws: Vec3) -> Vec3 {
         const UNITS: f32 = 1.0 / 65_536.0;
         const NEAR_ORIGIN: f32 = 1.0 / 4096.0;
         let largest = surface.position_ws.abs().max_element().max(self.radius * NEAR_ORIGIN);
         let length = (UNITS * largest).copysign(wi_ws.dot(surface.geometric_normal_ws));
-        Ray {
-            origin_ws: surface.position_ws + surface.geometric_normal_ws * length,
-            direction_ws: wi_ws,
-            t_max,
-        }
+        surface.geometric_normal_ws * length
     }
 }
 

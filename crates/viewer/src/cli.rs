@@ -47,6 +47,8 @@ pub(crate) enum Command {
     View(Box<view::ViewArgs>),
     /// Render an image to a file
     Render(Box<cmd::render::RenderArgs>),
+    /// Join parts of an image that were rendered apart
+    Merge(cmd::merge::MergeArgs),
     /// Compare samplers: frame times, and how fast the error falls
     Bench(cmd::bench::BenchArgs),
     /// Write what was learned about each light as a table

@@ -39,6 +39,7 @@ pub fn run() -> ExitCode {
     let outcome = interrupt::install().and_then(|()| match &cli.command {
         Command::View(args) => view::run(args),
         Command::Render(args) => cmd::render::run(args),
+        Command::Merge(args) => cmd::merge::run(args),
         Command::Bench(args) => cmd::bench::run(args),
         Command::Dump(args) => cmd::dump::run(args),
         Command::Compare(args) => cmd::compare::run(args),

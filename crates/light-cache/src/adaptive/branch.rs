@@ -3,7 +3,7 @@
 use crate::tree::{LEAF, MAX_LEAF_LIGHTS, Tree};
 
 /// A part of the light tree, in 32 bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Branch(u32);
 
 const LIGHT: u32 = 1 << 31;

@@ -37,7 +37,7 @@ const REBUILD_GROWTH: f32 = 1.15;
 
 /// A part of the light tree and what was seen of it here. What is seen is counted as a ratio: irradiance divided by the
 /// probability of the light within the entry, over what the emitter was estimated to send to the point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Entry {
     /// Which part of the light tree.
     pub(super) branch: Branch,
@@ -102,7 +102,7 @@ impl Entry {
 }
 
 /// Which cell a cell is, and since when.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Origin {
     /// Its level in the grid.
     pub(super) level: u32,
@@ -122,7 +122,7 @@ pub(super) struct Lights<'l> {
 }
 
 /// A cell of the grid.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Cell {
     /// Which cell it is.
     pub(super) origin: Origin,

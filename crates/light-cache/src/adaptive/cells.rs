@@ -14,7 +14,7 @@ const MAX_CELLS: usize = 1 << 14;
 const MAX_CUBES: usize = 1 << 17;
 
 /// The cells and the grid that finds them.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Cells {
     grid: Grid,
     cells: Vec<Cell>,

@@ -22,7 +22,7 @@ const MIN_SIZE: f32 = 1.0 / 4096.0;
 const MAX_LEVEL: u32 = 31;
 
 /// Maps keys to cells: open addressing, frozen during a frame.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Grid {
     eye_ws: Vec3,
     center_ws: Vec3,

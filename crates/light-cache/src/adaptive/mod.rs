@@ -28,7 +28,7 @@ use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint,
-    TableSampler, TreeVisibleSampler, records,
+    TableSampler, TreeVisibleSampler, records, state,
 };
 use cell::{Lights, Nearby};
 use cells::Cells;
@@ -48,7 +48,7 @@ const CELL_SHIFT: u32 = 11;
 const EACH: usize = 8;
 
 /// Learned cuts.
-#[derive(Debug)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub struct AdaptiveSampler {
     /// The light tree with visibility learned over the whole image: the prior of every cell.
     prior: TreeVisibleSampler,
@@ -237,6 +237,14 @@ impl LightSampler for AdaptiveSampler {
         };
         rayon::join(|| table.learn(logs), || cells.learn(lights, frame, logs));
         self.learn_s += start.elapsed().as_secs_f64();
+    }
+
+    fn save(&self) -> Option<Vec<u8>> {
+        state::save(self)
+    }
+
+    fn restore(&mut self, state: &[u8]) -> bool {
+        state::restore(self, state)
     }
 
     fn stats(&self) -> SamplerStats {

@@ -46,7 +46,7 @@ impl Cube {
 }
 
 /// What was seen of one entry.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Count {
     /// Times drawn.
     pub(super) drawn: f32,
@@ -72,7 +72,7 @@ impl Count {
 }
 
 /// One cube.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct SubCell {
     /// Number of the one around it in the layer before.
     around: u16,
@@ -123,7 +123,7 @@ impl SubCell {
 }
 
 /// All cubes of one size in which anything was seen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Layer {
     /// Number of each cube's [`SubCell`].
     numbers: Vec<u16>,
@@ -131,7 +131,7 @@ struct Layer {
 }
 
 /// All cubes of a cell in which anything was seen.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct SubCells {
     /// Largest first.
     layers: [Layer; LAYERS.len()],

@@ -19,7 +19,7 @@ const MAX_ROWS: usize = super::cell::MAX_ENTRIES.div_ceil(LANES);
 pub(super) type Lanes = [f32; LANES];
 
 /// One entry of every lane.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(64))]
 struct Row {
     center: [Lanes; 3],
@@ -36,7 +36,7 @@ struct Row {
 }
 
 /// What rows with spots and lights of limited range have besides.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(64))]
 struct Attenuation {
     cone_scale: Lanes,
@@ -50,7 +50,7 @@ struct Attenuation {
 struct Expected([Lanes; 3]);
 
 /// A cut, ready to be evaluated.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Weights {
     rows: Vec<Row>,
     /// Empty if no entry is attenuated.

@@ -16,7 +16,7 @@ const TINY_SQ: f32 = 1e-18;
 const PARALLEL: f32 = 0.999_999;
 
 /// Where the light is wanted, as importance reads it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Receiver {
     /// World position.
     pub(crate) position: Vec3,

@@ -24,9 +24,16 @@ pub(crate) fn position(u: u32, salt: u32) -> u64 {
 }
 
 /// The part of `width` that goes to the first of two choices of the given weights: at least 0, finite. A choice of positive
-/// weight gets a positive part as long as `width` >= 2; two zeros count as equal.
+/// weight gets a part of at least 1 as long as `width` >= 2; two zeros count as equal.
 #[inline]
 pub(crate) fn split(width: u64, first: f32, second: f32) -> u64 {
+    split_among(width, first, second, [1, 1])
+}
+
+/// [`split`] where the choices lead on to `counts` lights each: one of positive weight gets a part of at least its count as long as `width`
+/// is at least the sum of both, so that after any number of lopsided choices every light still has a part.
+#[inline]
+pub(crate) fn split_among(width: u64, first: f32, second: f32, counts: [u32; 2]) -> u64 {
     let smaller = first.min(second);
     if smaller <= 0.0 {
         return if first > 0.0 {
@@ -41,7 +48,12 @@ pub(crate) fn split(width: u64, first: f32, second: f32) -> u64 {
     // At most 2^31; by way of i64, which costs fewer instructions.
     let ratio = (smaller / (first + second) * 4_294_967_296.0) as i64 as u64;
     let part = ((u128::from(width) * u128::from(ratio)) >> 32) as u64;
-    let part = part.max(1).min(width.saturating_sub(1));
+    let [least, least_other] = if first <= second {
+        counts
+    } else {
+        [counts[1], counts[0]]
+    };
+    let part = part.max(least.into()).min(width.saturating_sub(least_other.into()));
     if first <= second { part } else { width - part }
 }
 
@@ -58,6 +70,18 @@ mod tests {
             let got = part as f64 / UNIT as f64;
             assert!((got - expected).abs() < 1e-6, "{a} {b}: {got} {expected}");
         }
+    }
+
+    #[test]
+    fn lopsided_choices_leave_a_part_for_every_light() {
+        // Sixteen lights, each 1e-30 of the one before: a chain of choices between one light and all that are left.
+        let mut width = 16;
+        for left in (1..16).rev() {
+            let part = split_among(width, 1.0, 1e-30, [1, left]);
+            assert_eq!((part, width - part), (1, u64::from(left)));
+            width -= part;
+        }
+        assert_eq!(split_among(UNIT, 1e-30, 1.0, [1000, 1]), 1000);
     }
 
     #[test]

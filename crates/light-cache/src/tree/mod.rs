@@ -32,7 +32,7 @@ pub(crate) const LEAF: u32 = u32::MAX;
 pub(crate) const MAX_LEAF_LIGHTS: usize = 4;
 
 /// A group of lights: one cache line.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Middle of the box around the lights, world space.
@@ -75,7 +75,7 @@ impl Default for Node {
 }
 
 /// A light at infinity.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct DistantLight {
     /// Unit direction the light goes.
     pub(crate) direction: Vec3,
@@ -86,7 +86,7 @@ pub(crate) struct DistantLight {
 }
 
 /// The tree, and the lights in its order.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Tree {
     /// Root first; empty if there are no lights with a place.
     pub(crate) nodes: Vec<Node>,

@@ -1,6 +1,6 @@
 //! Walking the tree: drawing a light, and the probability of one. Both cut the same interval with the same arithmetic.
 
-use super::interval::{probability, split};
+use super::interval::{probability, split, split_among};
 use super::{LEAF, MAX_LEAF_LIGHTS, Node, Receiver, Tree};
 
 /// Nodes that the estimate of the tree's irradiance at a point is refined to where lights at infinity compete with it.
@@ -60,7 +60,7 @@ impl<'t> Descent<'t> {
     /// width that is the light's own.
     #[inline]
     pub(crate) fn draw(&self, x: u64, width: u64) -> (u32, u64) {
-        let near = split(width, self.near, self.far);
+        let near = self.near_part(width);
         if x >= near {
             return self.draw_in(None, x - near, width - near);
         }
@@ -88,13 +88,28 @@ impl<'t> Descent<'t> {
         } else {
             0.0
         };
-        Some((root.child, split(width, first, second)))
+        let counts = self.children(root).map(|child| child.count);
+        Some((root.child, split_among(width, first, second, counts)))
+    }
+
+    /// The part of an interval of `width` that goes to the lights with a place.
+    #[inline]
+    fn near_part(&self, width: u64) -> u64 {
+        let counts = [self.tree.leaves.len() as u32, self.tree.distant.len() as u32];
+        split_among(width, self.near, self.far, counts)
+    }
+
+    /// The part of an interval of `width` that goes to the first of two nodes.
+    #[inline]
+    fn first_part(&self, width: u64, first: &Node, second: &Node) -> u64 {
+        let counts = [first.count, second.count];
+        split_among(width, self.receiver.group(first), self.receiver.group(second), counts)
     }
 
     /// The width that the light at `place` owns of an interval of `width`.
     #[inline]
     pub(crate) fn width_of(&self, place: u32, width: u64) -> u64 {
-        let near = split(width, self.near, self.far);
+        let near = self.near_part(width);
         if (place as usize) >= self.tree.leaves.len() {
             return self.width_in(None, place, width - near);
         }
@@ -116,7 +131,7 @@ impl<'t> Descent<'t> {
         let mut node = &self.tree.nodes[node as usize];
         while node.child != LEAF {
             let [first, second] = self.children(node);
-            let left = split(width, self.receiver.group(first), self.receiver.group(second));
+            let left = self.first_part(width, first, second);
             (node, x, width) = if x < left {
                 (first, x, left)
             } else {
@@ -124,7 +139,7 @@ impl<'t> Descent<'t> {
             };
         }
         let weights = self.leaf(node);
-        let left = split(width, weights[0] + weights[1], weights[2] + weights[3]);
+        let left = first_pair(width, &weights);
         let (pair, x, width) = if x < left {
             (0, x, left)
         } else {
@@ -148,7 +163,7 @@ impl<'t> Descent<'t> {
         let mut node = &self.tree.nodes[node as usize];
         while node.child != LEAF {
             let [first, second] = self.children(node);
-            let left = split(width, self.receiver.group(first), self.receiver.group(second));
+            let left = self.first_part(width, first, second);
             (node, width) = if place < second.first {
                 (first, left)
             } else {
@@ -163,7 +178,7 @@ impl<'t> Descent<'t> {
 
     /// Adds to `sum`, which is in scene order, the probability of every light: its part of an interval of `width`, and the width `floor` that each has.
     pub(crate) fn add_probabilities(&self, floor: u64, width: u64, sum: &mut [f64]) {
-        let near = split(width, self.near, self.far);
+        let near = self.near_part(width);
         for place in 0..self.tree.distant.len() {
             let own = floor + self.width_of_distant(place, width - near);
             sum[self.tree.distant[place].index as usize] += f64::from(probability(own));
@@ -186,7 +201,7 @@ impl<'t> Descent<'t> {
                 }
             } else {
                 let [first, second] = self.children(node);
-                let left = split(width, self.receiver.group(first), self.receiver.group(second));
+                let left = self.first_part(width, first, second);
                 open.extend([(second, width - left), (first, left)]);
             }
         }
@@ -215,7 +230,7 @@ impl<'t> Descent<'t> {
 
     #[inline]
     fn width_of_slot(&self, weights: &[f32; MAX_LEAF_LIGHTS], slot: usize, width: u64) -> u64 {
-        let left = split(width, weights[0] + weights[1], weights[2] + weights[3]);
+        let left = first_pair(width, weights);
         let (pair, width) = if slot < 2 { (0, left) } else { (2, width - left) };
         let left = split(width, weights[pair], weights[pair + 1]);
         if slot == pair { left } else { width - left }
@@ -283,6 +298,14 @@ impl<'t> Descent<'t> {
         let start = (0..index).map(|i| ends.next(self.distant(i))).last().unwrap_or(0);
         ends.next(self.distant(index)) - start
     }
+}
+
+/// The part of an interval of `width` that goes to the first two lights of a leaf.
+#[inline]
+fn first_pair(width: u64, weights: &[f32; MAX_LEAF_LIGHTS]) -> u64 {
+    let positive = |a: f32, b: f32| u32::from(a > 0.0) + u32::from(b > 0.0);
+    let [a, b, c, d] = *weights;
+    split_among(width, a + b, c + d, [positive(a, b), positive(c, d)])
 }
 
 /// Where each light at infinity ends in an interval: running sums in `f64`, one unit set aside for each that is not zero.

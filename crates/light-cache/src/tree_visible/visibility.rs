@@ -35,7 +35,7 @@ const MIN_VISIBLE: f32 = 1e-9;
 const LEAST_UNSEEN: f32 = 0.05;
 
 /// Evidence about a light or a group: shadow rays, and how many arrived, each weighted by the energy at stake.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Evidence {
     samples: f32,
     visible: f32,
@@ -67,7 +67,7 @@ impl Evidence {
 }
 
 /// What is known of one light.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
 struct Seen {
     evidence: Evidence,
     /// Running mean of the unshadowed contribution, by which each observation is measured.
@@ -78,7 +78,7 @@ struct Seen {
 }
 
 /// Visible shares of all lights and of all groups of a tree.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Visibility {
     /// In tree order.
     seen: Vec<Seen>,

@@ -76,6 +76,8 @@ pub(super) struct Node<'a> {
     pub(super) translation: Option<[f32; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) rotation: Option<Box<[f32; 4]>>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) children: Vec<u32>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) extensions: Option<NodeExtensions>,
 }

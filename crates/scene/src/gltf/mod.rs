@@ -47,7 +47,8 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     let mut report = std::mem::take(&mut parts.report);
     census::count_ignored(&source.json, &mut report);
 
-    let placed = nodes::walk(&source, &mut report)?;
+    let mut placed = nodes::walk(&source, &mut report)?;
+    parts.origin_ws = nodes::recentre(&source, &mut placed);
     let mut budget = Budget::new(source.bytes);
     let placements = placements(&source, &placed, &mut budget)?;
 

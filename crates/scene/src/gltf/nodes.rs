@@ -73,6 +73,24 @@ pub(super) fn walk(source: &Source, report: &mut Report) -> Result<Vec<Placed>, 
     Ok(placed)
 }
 
+/// Moves nodes that stand together far from zero there, while everything is in `f64`: vertices would lose their digits. Returns where
+/// zero was.
+pub(super) fn recentre(source: &Source, placed: &mut [Placed]) -> DVec3 {
+    // Metres: below it, steps of `f32` are a tenth of a millimetre.
+    const FAR: f64 = 1024.0;
+    const FAR_FOR_ITS_SIZE: f64 = 16.0;
+    let has_mesh = |node: &&Placed| source.json.nodes[node.node].mesh.is_some();
+    let places = || placed.iter().filter(has_mesh).map(|node| node.world.translation);
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (least, most) = places().fold(none, |(least, most), at| (least.min(at), most.max(at)));
+    let (center, size) = (0.5 * (least + most), (most - least).length());
+    if !center.is_finite() || center.length() < FAR.max(FAR_FOR_ITS_SIZE * size) {
+        return DVec3::ZERO;
+    }
+    placed.iter_mut().for_each(|node| node.world.translation -= center);
+    center
+}
+
 fn children(node: &Node) -> impl DoubleEndedIterator<Item = usize> {
     node.children.iter().flatten().map(|child| child.value())
 }

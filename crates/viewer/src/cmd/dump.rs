@@ -12,6 +12,7 @@ use crate::session::{self, Budget};
 use crate::{message, output, table};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
+use glam::Vec3;
 use light_cache::SamplerKind;
 use render::Method;
 use std::path::{Path, PathBuf};
@@ -120,7 +121,11 @@ pub(crate) fn run(args: &DumpArgs) -> Result<Status> {
 
     let interrupted = watch.writing();
     let written = if args.cells {
-        let rows = frames.cells();
+        let mut rows = frames.cells();
+        for row in &mut rows {
+            let place = loaded.scene.parts.in_file(Vec3::new(row.x_m, row.y_m, row.z_m));
+            [row.x_m, row.y_m, row.z_m] = place.as_vec3().to_array();
+        }
         save(args, format, &rows)?;
         format!("{} entries of cells", table::thousands(rows.len() as u64))
     } else {

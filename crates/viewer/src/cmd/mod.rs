@@ -5,4 +5,5 @@ pub(crate) mod compare;
 pub(crate) mod dump;
 pub(crate) mod estimate;
 pub(crate) mod info;
+pub(crate) mod merge;
 pub(crate) mod render;

@@ -1,5 +1,6 @@
 //! `render`: an image to a file.
 
+pub(crate) mod parts;
 mod stats;
 
 use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
@@ -9,12 +10,19 @@ use crate::output::is_stdout;
 use crate::session::{self, Budget, Loaded};
 use crate::tev::Display;
 use crate::{machine, message, output, table};
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, bail};
 use clap::{Args, ValueEnum};
+use glam::Vec3;
+use parts::{Header, Shard};
 use render::image::{self, Channel};
 use render::{Film, Method, RenderStats, Settings};
+use scene::Scene;
 use stats::Stats;
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// How often the file of --resume is brought up to date. Higher values write less; lower values lose less if the machine stops.
+const STATE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// Options of `render`.
 #[derive(Debug, Args)]
@@ -30,7 +38,7 @@ Ctrl-C writes what is there and exits with 130.")]
 pub(crate) struct RenderArgs {
     /// A .gltf or .glb file, or demo:NAME[:LIGHTS[:SEED]] (`manylight info` lists them)
     scene: String,
-    /// The image: .exr or .png
+    /// The image: .exr or .png; or .part, the state of the rendering, for `merge`
     #[arg(short, long, value_name = "FILE", alias = "outfile")]
     output: PathBuf,
     #[command(flatten)]
@@ -40,6 +48,14 @@ pub(crate) struct RenderArgs {
     /// Estimated from the variances of the pixels, after 16 samples or more. Slightly biased: samples that happen to agree stop it too soon.
     #[arg(long, value_name = "ERROR", value_parser = error_bound)]
     until_relmse: Option<f64>,
+    /// Go on where FILE ends, to the bit as if nothing had happened; FILE is made if it is missing, and kept up to date
+    #[arg(long, value_name = "FILE")]
+    resume: Option<PathBuf>,
+    /// Render the I-th of N equal shares of the samples, to be joined by `merge`
+    ///
+    /// Samplers that do not learn draw the samples that the whole would; the others learn in each share by themselves.
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse, requires = "spp", conflicts_with_all = ["time", "until_relmse"])]
+    shard: Option<Shard>,
     #[command(flatten)]
     size: SizeArgs,
     /// How lights are chosen
@@ -80,13 +96,21 @@ enum Aov {
 
 /// The file formats of images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Format {
+pub(crate) enum Format {
+    /// Linear.
     Exr,
+    /// Tone-mapped.
     Png,
+    /// The state of the rendering.
+    Part,
 }
 
 impl Format {
-    fn of(path: &Path) -> Result<Self> {
+    /// By the ending of a file's name.
+    ///
+    /// # Errors
+    /// Other endings.
+    pub(crate) fn of(path: &Path) -> Result<Self> {
         match path
             .extension()
             .and_then(|e| e.to_str())
@@ -95,6 +119,7 @@ impl Format {
         {
             Some("exr") => Ok(Self::Exr),
             Some("png") => Ok(Self::Png),
+            Some("part") => Ok(Self::Part),
             _ => bail!(
                 "{}: unknown image format; give a file name that ends in .exr or .png",
                 path.display()
@@ -132,6 +157,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_writable(path)?;
     }
+    if let Some(path) = &args.resume {
+        output::check_writable(path)?;
+    }
     let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)))?;
     settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
     settings.check()?;
@@ -149,12 +177,42 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         .display_server
         .as_ref()
         .map(|address| Display::connect(address, &title, settings.width, settings.height));
-    let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
-    session::render_frames(frames.as_mut(), budget, &watch, "rendering", |state| {
-        if let Some(display) = &mut display {
-            display.update(|| state.film().image());
+    let mut budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
+    let mut shard = None;
+    if let (Some(part), Some(all)) = (args.shard, budget.frames) {
+        let share = part.frames(all);
+        if share.is_empty() {
+            bail!(
+                "--shard {}/{}: only {all} samples to share; give a larger --spp",
+                part.index,
+                part.count
+            );
         }
-    });
+        let first = u32::try_from(share.start).context("--spp is too large to be shared")?;
+        frames.skip_frames(first)?;
+        budget.frames = Some(share.end - share.start);
+        shard = Some((part, all));
+    }
+    let header = Header::new(&loaded.what, &loaded.scene, camera, &settings, shard);
+    if let Some(path) = &args.resume {
+        parts::resume(path, &header, frames.as_mut())?;
+    }
+    let done = frames.film().spp();
+    budget.frames = budget.frames.map(|all| all.saturating_sub(done));
+    let mut saved = Instant::now();
+    if budget.frames != Some(0) {
+        session::render_frames(frames.as_mut(), budget, &watch, "rendering", |state| {
+            if let Some(display) = &mut display {
+                display.update(|| state.film().image());
+            }
+            if let Some(path) = args.resume.as_ref().filter(|_| saved.elapsed() > STATE_INTERVAL) {
+                if let Err(error) = parts::write(path, &header, state) {
+                    message::warn(format!("{error:#}"));
+                }
+                saved = Instant::now();
+            }
+        });
+    }
 
     let interrupted = watch.writing();
     let image = frames.film().image();
@@ -170,12 +228,17 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
             let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
             image::write_png(&args.output, &image, exposure)?;
         }
+        Format::Part => parts::write(&args.output, &header, frames.as_ref())?,
         Format::Exr => {
             let mut channels = Channel::rgb("", &image).to_vec();
-            layers(&args.aov, frames.film(), &mut channels);
+            layers(&args.aov, frames.film(), &loaded.scene, &mut channels);
             let metadata = metadata(&stats, &settings)?;
             image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
         }
+    }
+    // After the image: what is finished is kept even if there is no room for this.
+    if let Some(path) = args.resume.as_ref().filter(|_| frames.film().spp() > done) {
+        parts::write(path, &header, frames.as_ref())?;
     }
     if let Some(path) = &args.stats {
         let json = serde_json::to_string_pretty(&stats)? + "\n";
@@ -196,7 +259,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
 }
 
 /// The layers asked for, as channels.
-fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
+fn layers(wanted: &[Aov], film: &Film, scene: &Scene, channels: &mut Vec<Channel>) {
     let one = |name: &str, values: Vec<f32>| Channel {
         name: name.into(),
         values,
@@ -210,7 +273,7 @@ fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
     if wanted.contains(&Aov::Variance) {
         channels.push(one("variance.V", film.variance()));
     }
-    let Some(aovs) = film.aovs() else { return };
+    let Some(mut aovs) = film.aovs() else { return };
     if wanted.contains(&Aov::Albedo) {
         channels.extend(Channel::rgb("albedo", &aovs.albedo));
     }
@@ -218,6 +281,10 @@ fn layers(wanted: &[Aov], film: &Film, channels: &mut Vec<Channel>) {
         channels.extend(vector("normal", &aovs.normal));
     }
     if wanted.contains(&Aov::Position) {
+        let seen = aovs.position.pixels.iter_mut().zip(&aovs.depth);
+        for (position, _) in seen.filter(|(_, depth)| depth.is_finite()) {
+            *position = scene.parts.in_file(Vec3::from(*position)).as_vec3().to_array();
+        }
         channels.extend(vector("position", &aovs.position));
     }
     if wanted.contains(&Aov::Depth) {
@@ -242,6 +309,22 @@ fn metadata(stats: &Stats, settings: &Settings) -> Result<Vec<(String, String)>>
         entry("research", stats.research.unwrap_or("no").into()),
         entry("biased", stats.biased.clone().unwrap_or_else(|| "no".into())),
         entry("settings", serde_json::to_string(settings)?),
+    ])
+}
+
+/// What an EXR that was joined from parts tells about itself.
+///
+/// # Errors
+/// None that can be expected.
+pub(crate) fn metadata_of(header: &Header, spp: u64) -> Result<Vec<(String, String)>> {
+    let entry = |name: &str, value: String| (format!("manylight.{name}"), value);
+    Ok(vec![
+        entry("version", machine::VERSION.into()),
+        entry("scene", header.scene.clone()),
+        entry("camera", header.camera.clone()),
+        entry("sampler", header.settings.method.name().into()),
+        entry("spp", spp.to_string()),
+        entry("settings", serde_json::to_string(&header.settings)?),
     ])
 }
 

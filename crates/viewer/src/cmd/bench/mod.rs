@@ -6,6 +6,7 @@ mod reference;
 mod report;
 mod run;
 mod scenario;
+mod stress;
 mod summary;
 
 use crate::cli::{LightArgs, SizeArgs, any_method, seconds};
@@ -21,7 +22,7 @@ use reference::Reference;
 use render::Method;
 use run::Run;
 use scenario::Scenario;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use summary::SceneResult;
 
 /// Options of `bench`.
@@ -34,6 +35,7 @@ Examples:
   manylight bench demo:rooms --scenario walk --samplers tree,adaptive    errors of single frames on the move
   manylight bench demo:spheres --vary mis --samplers adaptive --time 4      which heuristic is best?
   manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
+  manylight bench --stress -o stress-out                       is anything wrong at the limits?
 
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
 measuring is not counted as time, building the light structures and learning are. The runs of a scene take turns frame
@@ -81,9 +83,19 @@ pub(crate) struct BenchArgs {
     size: SizeArgs,
     #[command(flatten)]
     light: LightArgs,
+    /// Instead, check what breaks renderers against answers known in closed form; exit code 1 if a check fails
+    #[arg(long, value_enum, value_name = "EFFORT", num_args = 0..=1, require_equals = true, default_missing_value = "standard",
+          conflicts_with_all = ["scenes", "samplers", "scenario", "reference"])]
+    stress: Option<stress::Effort>,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR", default_value = "bench-out")]
     output: PathBuf,
+}
+
+/// Makes the folder for the results, and makes sure that `file` can be written there.
+fn make_output(folder: &Path, file: &str) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| format!("{}: cannot make the output folder", folder.display()))?;
+    output::check_writable(&folder.join(file))
 }
 
 /// Reads the number of frames of a scenario.
@@ -97,6 +109,9 @@ fn frame_count(text: &str) -> Result<usize, String> {
 /// # Errors
 /// Bad input; files that cannot be written.
 pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
+    if let Some(effort) = args.stress {
+        return stress::run(args, effort);
+    }
     let methods: Vec<Method> = match args.samplers.as_slice() {
         [] => SamplerKind::ALL.map(Method::Sampled).to_vec(),
         some => Method::all_and_research()
@@ -119,9 +134,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     times.dedup();
     let settings = args.light.settings(methods[0], args.size.or((256, 192)))?;
     settings.check()?;
-    std::fs::create_dir_all(&args.output)
-        .with_context(|| format!("{}: cannot make the output folder", args.output.display()))?;
-    output::check_writable(&args.output.join("summary.json"))?;
+    make_output(&args.output, "summary.json")?;
     let cache = args
         .reference_cache
         .clone()

@@ -129,7 +129,7 @@ pub(super) fn collect(scene: &Scene, records: &[LightRecord], top: Option<usize>
 fn row(scene: &Scene, index: usize, record: &LightRecord) -> LightRow {
     let light = &scene.lights[index];
     let source = scene.light_source(index as u32);
-    let place = (light.kind != LightKind::Directional).then(|| light.center_ws());
+    let place = (light.kind != LightKind::Directional).then(|| scene.parts.in_file(light.center_ws()).as_vec3());
     let named = [&source.node, &source.mesh, &source.material]
         .into_iter()
         .find(|name| !name.is_empty());
