@@ -1,5 +1,6 @@
 //! `render`: an image to a file.
 
+mod sequence;
 mod stats;
 
 use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
@@ -13,6 +14,7 @@ use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use render::image::{self, Channel};
 use render::{Film, Method, RenderStats, Settings};
+use sequence::SequenceArgs;
 use stats::Stats;
 use std::path::{Path, PathBuf};
 
@@ -23,6 +25,7 @@ Examples:
   manylight render demo:rooms -o rooms.png
   manylight render demo:plaza:100000 -o plaza.exr --time 30 --stats plaza.json
   manylight render hall.glb -o hall.exr --spp 256 --max-bounces 4 --camera 1 --aov albedo,normal,variance
+  manylight render hall.glb --camera-path path.json --frames 0..90 --spp 32 -o walk_####.png
   manylight render hall.glb -o hall.exr --display-server localhost:14158    (watch it in tev)
 
 EXR files are linear, float32, in the scene's own units, with all settings in their metadata; PNG files are tone-mapped.
@@ -56,6 +59,8 @@ pub(crate) struct RenderArgs {
     /// Write all figures of the run as JSON ("-" for stdout)
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    #[command(flatten)]
+    sequence: SequenceArgs,
     /// Show the image while it is made in tev, which listens at localhost:14158
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<String>,
@@ -128,6 +133,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if format == Format::Exr && args.exposure.is_some() {
         message::warn("--exposure is for PNG only: an EXR holds the radiance as it is");
     }
+    let sequence = args.sequence.frames(&args.output)?;
     output::check_writable(&args.output)?;
     if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_writable(path)?;
@@ -141,6 +147,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
 
     session::use_threads(args.light.threads)?;
     let loaded = session::load_with_warnings(&args.scene)?;
+    if let Some(sequence) = &sequence {
+        return sequence::run(args, format, &settings, &loaded, sequence);
+    }
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
     let mut frames = session::start(&loaded.scene, camera, &settings)?;
@@ -165,18 +174,16 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     // Measuring takes about as long as a frame: only where somebody will read the result.
     let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
     let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted);
-    match format {
-        Format::Png => {
-            let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
-            image::write_png(&args.output, &image, exposure)?;
-        }
-        Format::Exr => {
-            let mut channels = Channel::rgb("", &image).to_vec();
-            layers(&args.aov, frames.film(), &mut channels);
-            let metadata = metadata(&stats, &settings)?;
-            image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
-        }
-    }
+    let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
+    write(
+        &args.output,
+        format,
+        &args.aov,
+        exposure,
+        frames.film(),
+        &stats,
+        &settings,
+    )?;
     if let Some(path) = &args.stats {
         let json = serde_json::to_string_pretty(&stats)? + "\n";
         if is_stdout(path) {
@@ -193,6 +200,29 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         ));
     }
     Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}
+
+/// Writes the film's image: a PNG at that exposure, or an EXR with the layers asked for.
+fn write(
+    path: &Path,
+    format: Format,
+    aovs: &[Aov],
+    exposure: f32,
+    film: &Film,
+    stats: &Stats,
+    settings: &Settings,
+) -> Result<()> {
+    let image = film.image();
+    match format {
+        Format::Png => image::write_png(path, &image, exposure)?,
+        Format::Exr => {
+            let mut channels = Channel::rgb("", &image).to_vec();
+            layers(aovs, film, &mut channels);
+            let metadata = metadata(stats, settings)?;
+            image::write_exr(path, settings.width, settings.height, &channels, &metadata)?;
+        }
+    }
+    Ok(())
 }
 
 /// The layers asked for, as channels.
