@@ -1,5 +1,6 @@
 //! The program as people and scripts meet it: exit codes, messages, files, pipes.
 
+mod camera_paths;
 mod measuring;
 mod sampling;
 mod state;

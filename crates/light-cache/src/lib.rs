@@ -259,4 +259,9 @@ pub trait LightSampler: Debug + Send + Sync {
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
         Vec::new()
     }
+
+    /// The number of the cell that serves a point, as in [`CellRecord::cell`]; `None` where none does.
+    fn cell_at(&self, _point: &ShadingPoint) -> Option<u64> {
+        None
+    }
 }

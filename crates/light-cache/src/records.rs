@@ -178,6 +178,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.cells(scene)
     }
 
+    fn cell_at(&self, point: &ShadingPoint) -> Option<u64> {
+        self.inner.cell_at(point)
+    }
+
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         let mut records = of_sampler(&self.inner, scene, &self.points);
         for (light, (record, observed)) in records.iter_mut().zip(&self.observed).enumerate() {

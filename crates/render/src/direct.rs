@@ -117,6 +117,11 @@ pub(crate) trait DirectLight: Sync + Send {
         Vec::new()
     }
 
+    /// The number of the cell that serves a point.
+    fn cell_at(&self, _point: &ShadingPoint) -> Option<u64> {
+        None
+    }
+
     /// Chooses a light and does nothing with it; nothing where no choice is made.
     fn choose(&self, _scene: &Scene, _point: &ShadingPoint, _u: u32) -> Option<Choice> {
         None
@@ -230,6 +235,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
 
     fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
         self.0.cells(scene)
+    }
+
+    fn cell_at(&self, point: &ShadingPoint) -> Option<u64> {
+        self.0.cell_at(point)
     }
 
     #[inline]

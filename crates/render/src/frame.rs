@@ -148,6 +148,9 @@ pub trait FrameLoop<'s>: Send {
     /// What the sampler has learned about each cell; empty for samplers without cells.
     fn cells(&self) -> Vec<CellRecord>;
 
+    /// The number of the cell that serves each point, as in [`CellRecord::cell`]; `None` where none does.
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>>;
+
     /// The probability with which each light is drawn now, mean over `points`; empty for methods without a sampler.
     fn light_probabilities(&self, points: &[ShadingPoint]) -> Vec<f64>;
 
@@ -285,6 +288,9 @@ pub(crate) trait Frames: Send {
     /// See [`FrameLoop::cells`].
     fn cells(&self, scene: &Scene) -> Vec<CellRecord>;
 
+    /// See [`FrameLoop::cells_at`].
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>>;
+
     /// See [`FrameLoop::light_probabilities`].
     fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64>;
 
@@ -375,6 +381,10 @@ impl<D: DirectLight> Frames for Drawn<D> {
 
     fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
         self.direct.cells(scene)
+    }
+
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
+        points.par_iter().map(|point| self.direct.cell_at(point)).collect()
     }
 
     fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64> {
@@ -576,6 +586,10 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
 
     fn cells(&self) -> Vec<CellRecord> {
         self.frames.cells(&self.eye.scene)
+    }
+
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
+        self.frames.cells_at(points)
     }
 
     fn light_probabilities(&self, points: &[ShadingPoint]) -> Vec<f64> {

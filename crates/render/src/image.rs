@@ -11,7 +11,7 @@ use scene::luminance;
 use std::io::{BufReader, Cursor};
 use std::path::Path;
 
-mod display;
+pub(crate) mod display;
 
 /// One channel of an EXR file: dotted name ("R", "albedo.R", "depth.Z") and `width * height` values.
 #[derive(Clone, Debug)]

@@ -140,6 +140,10 @@ impl Frames for Oracle {
         Vec::new()
     }
 
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
+        vec![None; points.len()]
+    }
+
     fn light_probabilities(&self, _scene: &Scene, _points: &[ShadingPoint]) -> Vec<f64> {
         Vec::new()
     }

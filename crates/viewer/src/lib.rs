@@ -7,6 +7,8 @@
     reason = "doc comments of arguments are their help text, brackets and all"
 )]
 
+mod camera_path;
+mod clean;
 mod cli;
 mod cmd;
 mod exit;

@@ -61,6 +61,12 @@ impl Cells {
         Some(cell.around(spot.cube))
     }
 
+    /// The number of the cell of `point`, if there is one.
+    pub(super) fn number_at(&self, point: &ShadingPoint) -> Option<u64> {
+        let number = self.grid.find(self.grid.locate(point).key);
+        (number != NO_CELL).then_some(number.into())
+    }
+
     /// What is known in each cell that is in use; `frame` is the number of frames done.
     pub(super) fn records(&self, tree: &Tree, frame: u64) -> Vec<CellRecord> {
         let numbered = (0..).zip(&self.cells);

@@ -271,6 +271,10 @@ impl LightSampler for AdaptiveSampler {
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
         self.cells.records(self.tree(), self.frames)
     }
+
+    fn cell_at(&self, point: &ShadingPoint) -> Option<u64> {
+        self.cells.number_at(point)
+    }
 }
 
 impl AdaptiveSampler {

@@ -45,7 +45,7 @@ struct Attenuation {
 }
 
 /// What entries are expected to bring, by channel, over what they weigh, both without the factors of cubes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(64))]
 struct Expected([Lanes; 3]);
 

@@ -35,7 +35,7 @@ const MAX_STOPS: f32 = 4.026_069;
 
 /// Sobotka's AgX (2022) by the polynomial of Wrensch, "Minimal AgX Implementation" (2023), with a moderate look on
 /// top (power 1.15, saturation 1.2: between its base and its "punchy"). Values that are not finite or negative become 0.
-pub(super) fn tone_mapped(linear: Vec3) -> [u8; 3] {
+pub(crate) fn tone_mapped(linear: Vec3) -> [u8; 3] {
     const LOOK_POWER: f32 = 1.15;
     const LOOK_SATURATION: f32 = 1.2;
     // `max` returns the other operand for NaN.

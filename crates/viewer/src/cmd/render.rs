@@ -1,6 +1,7 @@
 //! `render`: an image to a file.
 
 pub(crate) mod parts;
+mod sequence;
 mod stats;
 
 use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
@@ -17,6 +18,7 @@ use parts::{Header, Shard};
 use render::image::{self, Channel};
 use render::{Film, Method, RenderStats, Settings};
 use scene::Scene;
+use sequence::SequenceArgs;
 use stats::Stats;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -31,6 +33,7 @@ Examples:
   manylight render demo:rooms -o rooms.png
   manylight render demo:plaza:100000 -o plaza.exr --time 30 --stats plaza.json
   manylight render hall.glb -o hall.exr --spp 256 --max-bounces 4 --camera 1 --aov albedo,normal,variance
+  manylight render hall.glb --camera-path path.json --frames 0..90 --spp 32 -o walk_####.png
   manylight render hall.glb -o hall.exr --display-server localhost:14158    (watch it in tev)
 
 EXR files are linear, float32, in the scene's own units, with all settings in their metadata; PNG files are tone-mapped.
@@ -72,6 +75,8 @@ pub(crate) struct RenderArgs {
     /// Write all figures of the run as JSON ("-" for stdout)
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    #[command(flatten)]
+    sequence: SequenceArgs,
     /// Show the image while it is made in tev, which listens at localhost:14158
     #[arg(long, value_name = "HOST:PORT")]
     display_server: Option<String>,
@@ -153,6 +158,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if format == Format::Exr && args.exposure.is_some() {
         message::warn("--exposure is for PNG only: an EXR holds the radiance as it is");
     }
+    let sequence = args.sequence.frames(&args.output)?;
     output::check_writable(&args.output)?;
     if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_writable(path)?;
@@ -169,6 +175,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
 
     session::use_threads(args.light.threads)?;
     let loaded = session::load_with_warnings(&args.scene)?;
+    if let Some(sequence) = &sequence {
+        return sequence::run(args, format, &settings, &loaded, sequence);
+    }
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
     let mut frames = session::start(&loaded.scene, camera, &settings)?;
@@ -224,16 +233,16 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
     let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted);
     match format {
-        Format::Png => {
-            let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
-            image::write_png(&args.output, &image, exposure)?;
-        }
         Format::Part => parts::write(&args.output, &header, frames.as_ref())?,
-        Format::Exr => {
-            let mut channels = Channel::rgb("", &image).to_vec();
-            layers(&args.aov, frames.film(), &loaded.scene, &mut channels);
-            let metadata = metadata(&stats, &settings)?;
-            image::write_exr(&args.output, settings.width, settings.height, &channels, &metadata)?;
+        _ => {
+            let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
+            let made = Made {
+                film: frames.film(),
+                scene: &loaded.scene,
+                stats: &stats,
+                settings: &settings,
+            };
+            write(&args.output, format, &args.aov, exposure, &made)?;
         }
     }
     // After the image: what is finished is kept even if there is no room for this.
@@ -256,6 +265,28 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         ));
     }
     Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}
+
+/// A rendering that is to be written.
+struct Made<'m> {
+    film: &'m Film,
+    scene: &'m Scene,
+    stats: &'m Stats,
+    settings: &'m Settings,
+}
+
+/// Writes the film's image: a PNG at that exposure, or an EXR with the layers asked for.
+fn write(path: &Path, format: Format, aovs: &[Aov], exposure: f32, made: &Made<'_>) -> Result<()> {
+    let image = made.film.image();
+    if format == Format::Png {
+        image::write_png(path, &image, exposure)?;
+        return Ok(());
+    }
+    let mut channels = Channel::rgb("", &image).to_vec();
+    layers(aovs, made.film, made.scene, &mut channels);
+    let metadata = metadata(made.stats, made.settings)?;
+    image::write_exr(path, image.width, image.height, &channels, &metadata)?;
+    Ok(())
 }
 
 /// The layers asked for, as channels.

@@ -116,7 +116,7 @@ pub(super) const HELP: [(&str, &[Line]); 4] = [
     (
         "Picture",
         &[
-            line("0  1 ... 5", "image, debug views"),
+            line("0  1 ... 6", "image, debug views"),
             line("T", "next sampler"),
             line("N", "noise as it is, or taken away"),
             line(",  .", "darker, brighter"),

@@ -276,6 +276,7 @@ impl App {
         let Some(picture) = self.renderer.take_picture() else {
             return;
         };
+        let start = Instant::now();
         if let Some(display) = &mut self.display
             && !display.show(&picture)
         {
@@ -283,6 +284,7 @@ impl App {
         }
         self.legend.clone_from(&picture.shown.legend);
         self.figures = picture.figures;
+        self.figures.stages.upload_ms = start.elapsed().as_secs_f64() * 1e3;
         self.times.render.push(picture.figures.frame_ms);
         if picture.exposure.is_some() {
             self.exposure.fitting = picture.exposure;

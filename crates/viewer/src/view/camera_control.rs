@@ -145,18 +145,6 @@ impl FlyCamera {
     }
 }
 
-/// Where a point of the world appears in a picture, in shares of its width and height; `None` behind the camera.
-pub(super) fn project(camera: &Camera, aspect: f32, point_ws: Vec3) -> Option<Vec2> {
-    let local = camera.world_from_camera.inverse().transform_point3(point_ws);
-    if local.z >= -1e-6 {
-        return None;
-    }
-    let half_height = (0.5 * camera.fov_y).tan();
-    let on_plane = Vec2::new(local.x, -local.y) / (-local.z * half_height);
-    let share = Vec2::new(on_plane.x / aspect, on_plane.y) * 0.5 + 0.5;
-    share.is_finite().then_some(share)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -253,18 +241,5 @@ mod tests {
         assert_eq!(fly.camera().world_from_camera, before);
         fly.change_speed(1e9);
         assert!(fly.speed().is_finite());
-    }
-
-    #[test]
-    fn a_point_is_projected_to_the_pixel_whose_ray_meets_it() {
-        let mut fly = fly();
-        fly.look(Vec2::new(130.0, 77.0), 1000.0);
-        let (width, height) = (640, 360);
-        let rays = fly.camera().rays(width, height);
-        let at = Vec2::new(123.0, 200.0);
-        let point = rays.origin_ws + rays.direction_ws(at) * 7.0;
-        let share = project(fly.camera(), 640.0 / 360.0, point).expect("in front");
-        assert!((share * Vec2::new(640.0, 360.0) - at).length() < 0.01, "{share}");
-        assert!(project(fly.camera(), 1.0, rays.origin_ws - rays.direction_ws(at)).is_none());
     }
 }

@@ -3,6 +3,7 @@
 use super::actions::{Action, KEY_NAMES, Part, With, action_of};
 use super::app::App;
 use super::frame_times::Summary;
+use super::renderer::Stages;
 use super::script::{Script, Step};
 use super::views::View;
 use crate::output;
@@ -50,6 +51,8 @@ struct Report {
     window_frame_ms: Option<Summary>,
     render_frame_ms: Option<Summary>,
     input_to_picture_ms: Option<Summary>,
+    /// Of the newest picture.
+    stages: Stages,
 }
 
 impl Driver {
@@ -278,6 +281,7 @@ impl App {
             window_frame_ms: self.times.window.summary(),
             render_frame_ms: self.times.render.summary(),
             input_to_picture_ms: self.times.latency.summary(),
+            stages: self.figures.stages,
         };
         output::write(path, (serde_json::to_string_pretty(&report)? + "\n").as_bytes())
     }

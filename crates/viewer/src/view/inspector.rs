@@ -2,6 +2,7 @@
 
 use super::renderer::shading_point;
 use glam::{Vec2, Vec3};
+use light_cache::ShadingPoint;
 use render::FrameLoop;
 use scene::{Camera, LightKind, PrimitiveId, Ray, Scene, Surface};
 
@@ -26,6 +27,43 @@ pub(super) struct Inspection {
     pub(super) lights: Vec<LightHere>,
     /// Lights that take half of the samples here, at least.
     pub(super) half_of_samples: usize,
+    /// The cell that serves the point, if one does.
+    pub(super) cell: Option<CellHere>,
+}
+
+/// What the cell of a point is like.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CellHere {
+    pub(super) number: u64,
+    /// Edge, metres.
+    pub(super) size_m: f32,
+    /// Where its normals point, such as "+y".
+    pub(super) normal: &'static str,
+    /// Lights and clusters of lights that it tells apart.
+    pub(super) entries: usize,
+    /// Observations that it rests on.
+    pub(super) samples: u64,
+    /// Frames since it was made.
+    pub(super) age: u64,
+}
+
+impl CellHere {
+    fn at(point: &ShadingPoint, frames: &dyn FrameLoop<'_>) -> Option<Self> {
+        let number = frames.cells_at(&[*point]).into_iter().flatten().next()?;
+        let entries: Vec<_> = frames
+            .cells()
+            .into_iter()
+            .filter(|entry| entry.cell == number)
+            .collect();
+        entries.first().map(|first| Self {
+            number,
+            size_m: first.size_m,
+            normal: first.normal,
+            entries: entries.len(),
+            samples: entries.iter().map(|entry| entry.samples).sum(),
+            age: first.age,
+        })
+    }
 }
 
 /// A light as a point sees it.
@@ -57,8 +95,9 @@ pub(super) fn inspect(
     };
     let hit = scene.nearest(&ray, PrimitiveId::NONE)?;
     let surface = scene.surface(&ray, &hit);
+    let point = shading_point(scene, &ray, &hit);
     let mut probabilities: Vec<(u32, f64)> = (0..)
-        .zip(frames.light_probabilities(&[shading_point(scene, &ray, &hit)]))
+        .zip(frames.light_probabilities(&[point]))
         .filter(|(_, probability)| *probability > 0.0)
         .collect();
     probabilities.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
@@ -82,6 +121,7 @@ pub(super) fn inspect(
             .map(|&(light, p)| light_here(scene, &surface, light, p))
             .collect(),
         half_of_samples,
+        cell: CellHere::at(&point, frames),
     })
 }
 
@@ -137,6 +177,11 @@ mod tests {
         let listed: f64 = found.lights.iter().map(|light| light.probability).sum();
         assert!(listed > 0.0 && listed <= 1.0 + 1e-6, "{listed}");
         assert!((1..=64).contains(&found.half_of_samples));
+        let cell = found.cell.expect("eight frames make cells");
+        assert!(
+            cell.size_m > 0.0 && cell.entries > 0 && cell.samples > 0 && cell.normal == "+y",
+            "{cell:?}"
+        );
     }
 
     #[test]

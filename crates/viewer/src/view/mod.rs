@@ -6,7 +6,6 @@
 mod actions;
 mod app;
 mod camera_control;
-mod denoise;
 mod display;
 mod drive;
 mod events;
@@ -22,6 +21,7 @@ mod script;
 mod settings_file;
 mod views;
 
+use crate::camera_path;
 use crate::cli::{LightArgs, any_method, default_method};
 use crate::exit::{Refusal, Status};
 use crate::session;
@@ -93,7 +93,7 @@ fn milliseconds(text: &str) -> Result<f64, String> {
 /// Bad input; [`Refusal::NoGpu`] if there is no display or nothing to draw to it with.
 pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
     let script = args.script.as_deref().map(Script::read).transpose()?;
-    let path = args.camera_path.as_deref().map(settings_file::read_path).transpose()?;
+    let path = args.camera_path.as_deref().map(camera_path::read).transpose()?;
     let settings = args.light.settings(args.sampler, (1, 1))?;
     settings.check()?;
     session::use_threads(args.light.threads)?;

@@ -1,7 +1,8 @@
 //! Bookmarks, camera paths, and the camera as text.
 
 use super::app::App;
-use super::settings_file::{self, Pose, Remembered};
+use super::settings_file::Remembered;
+use crate::camera_path::{self, Pose};
 use crate::message;
 use scene::Camera;
 use std::path::PathBuf;
@@ -72,7 +73,7 @@ impl App {
             Some(path) => {
                 let name = |number: u32| PathBuf::from(format!("manylight-path-{number:04}.json"));
                 let free = (1..).map(name).find(|name| !name.exists()).unwrap_or_default();
-                let written = settings_file::write_path(&free, &path);
+                let written = camera_path::write(&free, &path);
                 self.say(match written {
                     Ok(()) => format!("{}: {} frames; P plays them", free.display(), path.len()),
                     Err(error) => format!("P plays {} frames, but they are not kept: {error:#}", path.len()),

@@ -5,12 +5,12 @@
 
 mod messages;
 
-pub(super) use messages::{Command, Figures, Picture, Report};
+pub(super) use messages::{Command, Figures, Picture, Report, Stages};
 
-use super::denoise;
 use super::inspector;
 use super::resolution::Resolution;
 use super::views::{Shown, View};
+use crate::clean::Cleaner;
 use crate::{machine, session};
 use glam::{Vec2, Vec3};
 use light_cache::{SamplerKind, ShadingPoint};
@@ -64,6 +64,7 @@ impl Renderer {
             paused: false,
             wants_importance: false,
             resolution: Resolution::new(30.0),
+            cleaner: Cleaner::default(),
             stage: None,
         };
         let thread = std::thread::Builder::new()
@@ -121,6 +122,8 @@ struct Worker {
     paused: bool,
     wants_importance: bool,
     resolution: Resolution,
+    /// What earlier pictures knew, for the eyes.
+    cleaner: Cleaner,
     stage: Option<Stage>,
 }
 
@@ -142,6 +145,8 @@ struct Stage {
     rays: u64,
     /// What the last frames took.
     seconds: f64,
+    /// Seconds of learning until the last frames, and in them.
+    learned: [f64; 2],
 }
 
 impl Worker {
@@ -188,7 +193,10 @@ impl Worker {
 
     fn obey(&mut self, command: Command) {
         let outcome = match command {
-            Command::Scene(scene, camera) => self.enter(scene.clone(), scene, camera),
+            Command::Scene(scene, camera) => {
+                self.cleaner.forget();
+                self.enter(scene.clone(), scene, camera)
+            }
             Command::Look(camera, since) => {
                 if let Some(stage) = &mut self.stage {
                     stage.camera.clone_from(&camera);
@@ -208,6 +216,7 @@ impl Worker {
                 if before == self.settings {
                     Ok(())
                 } else {
+                    self.cleaner.forget();
                     self.begin_anew()
                 }
             }
@@ -275,6 +284,7 @@ impl Worker {
             importance_told: None,
             rays: 0,
             seconds: 0.0,
+            learned: [0.0; 2],
         });
         Ok(())
     }
@@ -382,6 +392,8 @@ impl Worker {
         }
         let seconds = start.elapsed().as_secs_f64();
         stage.seconds = seconds;
+        let learn_s = stage.frames.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
+        stage.learned = [learn_s, learn_s - stage.learned[0]];
 
         let due = stage.published.is_none_or(|at| at.elapsed() >= BETWEEN_REFINEMENTS);
         if due || !still || stage.frames.film().spp() <= 2 {
@@ -399,10 +411,18 @@ impl Worker {
         let film = stage.frames.film();
         let (width, height) = (film.width(), film.height());
         let still = (width, height) == self.window && stage.changed.elapsed() >= REST;
+        let learn_ms = stage.learned[1] * 1e3;
+        let mut stages = Stages {
+            trace_ms: stage.seconds * 1e3 - learn_ms,
+            learn_ms,
+            ..Stages::default()
+        };
         let shown = if self.view == View::Image && self.denoise && film.spp() < CLEAN_SPP {
-            Shown::image(&denoise::denoised(film))
+            let cleaned = self.cleaner.clean(film, &stage.camera);
+            (stages.history_ms, stages.denoise_ms) = (cleaned.history_ms, cleaned.filter_ms);
+            Shown::image(&cleaned.pixels)
         } else {
-            self.view.of(film)
+            self.view.of(stage.frames.as_ref())
         };
         let stats = stage.frames.stats();
         let rays = stats.rays_nearest + stats.rays_occluded;
@@ -418,6 +438,7 @@ impl Worker {
                 view: self.view,
                 size: (width, height),
                 frame_ms: stage.seconds * 1e3,
+                stages,
                 rays_per_s: (rays - stage.rays) as f64
                     / stage.published.map_or(stage.seconds, |at| at.elapsed().as_secs_f64()),
                 cells: sampler.cells,

@@ -18,7 +18,7 @@ FRAME key [ctrl+|alt+]NAME [N]    hold a key for N frames (1)
 FRAME look DX DY                  move the mouse by pixels, right button held
 FRAME wheel NOTCHES               change the speed
 FRAME click X Y                   left click at a share of width and height
-FRAME view NAME                   image, albedo, normal, depth, light, error
+FRAME view NAME                   image, albedo, normal, depth, light, error, cells
 FRAME sampler NAME                as --sampler
 FRAME resize WIDTH HEIGHT         as if the window had that size
 FRAME open SCENE                  load another scene

@@ -1,13 +1,11 @@
 //! What the window remembers from one run to the next, in the user's configuration folder.
 
 use super::views::View;
+use crate::camera_path::Pose;
 use crate::output;
-use anyhow::Context;
-use glam::{Affine3A, Mat3A, Vec3A};
-use scene::Camera;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Scenes that are remembered.
 const RECENT: usize = 8;
@@ -26,16 +24,6 @@ pub(super) struct Remembered {
     pub(super) view: View,
     /// Bookmarks by scene, by number.
     pub(super) bookmarks: BTreeMap<String, BTreeMap<usize, Pose>>,
-}
-
-/// A camera in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Pose {
-    position: [f32; 3],
-    /// Columns of camera to world.
-    rotation: [f32; 9],
-    /// Radians.
-    fov_y: f32,
 }
 
 impl Default for Remembered {
@@ -78,56 +66,6 @@ impl Remembered {
     }
 }
 
-impl From<&Camera> for Pose {
-    fn from(camera: &Camera) -> Self {
-        let pose = camera.world_from_camera;
-        Self {
-            position: pose.translation.to_array(),
-            rotation: pose.matrix3.to_cols_array(),
-            fov_y: camera.fov_y,
-        }
-    }
-}
-
-impl Pose {
-    /// The camera, if the numbers make one.
-    pub(super) fn camera(&self, name: &str) -> Option<Camera> {
-        let rotation = Mat3A::from_cols_array(&self.rotation);
-        let orthonormal = (rotation * rotation.transpose()).abs_diff_eq(Mat3A::IDENTITY, 1e-3);
-        let translation = Vec3A::from(self.position);
-        let valid = orthonormal && rotation.determinant() > 0.0 && translation.is_finite();
-        (valid && self.fov_y > 0.0 && self.fov_y < std::f32::consts::PI).then(|| Camera {
-            name: name.into(),
-            world_from_camera: Affine3A {
-                matrix3: rotation,
-                translation,
-            },
-            fov_y: self.fov_y,
-        })
-    }
-}
-
-/// Reads a camera path: a JSON list of cameras, one a frame.
-///
-/// # Errors
-/// If it cannot be read, or is no camera path.
-pub(super) fn read_path(path: &Path) -> anyhow::Result<Vec<Camera>> {
-    let shown = path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("{shown}: cannot read the camera path"))?;
-    let poses: Vec<Pose> = serde_json::from_str(&text).with_context(|| format!("{shown}: no camera path"))?;
-    let cameras: Option<Vec<Camera>> = poses.iter().map(|pose| pose.camera("path")).collect();
-    cameras.with_context(|| format!("{shown}: a pose is no rotation, or its angle of view is not between 0 and pi"))
-}
-
-/// Writes a camera path.
-///
-/// # Errors
-/// Those of the file system.
-pub(super) fn write_path(path: &Path, cameras: &[Camera]) -> anyhow::Result<()> {
-    let poses: Vec<Pose> = cameras.iter().map(Pose::from).collect();
-    output::write(path, (serde_json::to_string(&poses)? + "\n").as_bytes())
-}
-
 /// Where it is kept; `None` where there is no home.
 fn path() -> Option<PathBuf> {
     let folder = |name: &str| {
@@ -149,6 +87,7 @@ fn path() -> Option<PathBuf> {
 mod tests {
     use super::*;
     use glam::Vec3;
+    use scene::Camera;
 
     #[test]
     fn what_is_written_is_read_again() {
@@ -177,33 +116,6 @@ mod tests {
                 ..Remembered::default()
             }
         );
-        let pose = Pose {
-            position: [0.0; 3],
-            rotation: [0.0; 9],
-            fov_y: 1.0,
-        };
-        assert!(pose.camera("flat").is_none());
-    }
-
-    #[test]
-    fn a_camera_path_is_read_as_it_was_written_and_others_are_refused() {
-        let folder = tempfile::tempdir().expect("a temporary folder");
-        let file = folder.path().join("path.json");
-        let camera = |x: f32| Camera::look_at("c", Vec3::X * x, Vec3::new(x, 1.0, 5.0), Vec3::Y, 1.0);
-        let cameras: Vec<Camera> = (0..5).map(|i| camera(i as f32)).collect();
-        write_path(&file, &cameras).expect("a writable folder");
-        let read = read_path(&file).expect("its own file");
-        let poses = |cameras: &[Camera]| cameras.iter().map(|c| c.world_from_camera).collect::<Vec<_>>();
-        assert_eq!(poses(&read), poses(&cameras));
-        for text in ["walk", "[{\"position\": [0, 0, 0]}]"] {
-            std::fs::write(&file, text).expect("a writable folder");
-            let error = format!("{:#}", read_path(&file).expect_err(text));
-            assert!(
-                error.contains("path.json") && error.contains("no camera path"),
-                "{error}"
-            );
-        }
-        assert!(read_path(&folder.path().join("none.json")).is_err());
     }
 
     #[test]

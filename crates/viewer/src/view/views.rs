@@ -1,8 +1,9 @@
 //! What the window can show besides the image: each view with a legend.
 
 use glam::Vec3;
+use light_cache::ShadingPoint;
 use rayon::prelude::*;
-use render::{Film, Image};
+use render::{Film, FrameLoop, Image};
 use scene::luminance;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +18,7 @@ pub(super) enum View {
     Depth,
     Light,
     Error,
+    Cells,
 }
 
 /// Texels ready for upload, and how to read them.
@@ -42,13 +44,14 @@ impl Shown {
 }
 
 impl View {
-    pub(super) const ALL: [Self; 6] = [
+    pub(super) const ALL: [Self; 7] = [
         Self::Image,
         Self::Albedo,
         Self::Normal,
         Self::Depth,
         Self::Light,
         Self::Error,
+        Self::Cells,
     ];
 
     /// In panels and scripts.
@@ -60,6 +63,7 @@ impl View {
             Self::Depth => "depth",
             Self::Light => "light",
             Self::Error => "error",
+            Self::Cells => "cells",
         }
     }
 
@@ -72,6 +76,7 @@ impl View {
             Self::Depth => "distance from the camera",
             Self::Light => "light chosen by the last sample",
             Self::Error => "standard error of the pixel / its value",
+            Self::Cells => "cells that know which lights matter there",
         }
     }
 
@@ -80,8 +85,9 @@ impl View {
         !matches!(self, Self::Image | Self::Error)
     }
 
-    /// The film as this view shows it. A view whose auxiliary images are not there is black.
-    pub(super) fn of(self, film: &Film) -> Shown {
+    /// What was rendered as this view shows it. A view whose auxiliary images are not there is black.
+    pub(super) fn of(self, frames: &dyn FrameLoop<'_>) -> Shown {
+        let film = frames.film();
         let aovs = if self.needs_aovs() { film.aovs() } else { None };
         let as_is = |texels: Vec<[f32; 4]>, legend: &str| Shown {
             texels,
@@ -122,6 +128,20 @@ impl View {
                     .map(|&light| light_color(light as i64).extend(1.0).to_array());
                 as_is(shown.collect(), "one colour per light; black: none chosen")
             }
+            (Self::Cells, Some(aovs)) => {
+                let pixels = aovs.position.pixels.par_iter().zip(&aovs.normal.pixels);
+                let points = pixels.map(|(&position, &normal)| ShadingPoint {
+                    position_ws: position.into(),
+                    normal_ws: normal.into(),
+                    primary: true,
+                });
+                let cells = frames.cells_at(&points.collect::<Vec<_>>());
+                let shown = cells.par_iter().zip(&aovs.depth).map(|(cell, depth)| {
+                    let cell = cell.filter(|_| depth.is_finite());
+                    cell_color(cell).extend(1.0).to_array()
+                });
+                as_is(shown.collect(), "one colour per cell; black: none yet")
+            }
             (_, None) => as_is(vec![[0.0; 4]; (film.width() * film.height()) as usize], "not kept"),
         }
     }
@@ -144,6 +164,11 @@ pub(super) fn light_color(light: i64) -> Vec3 {
     let value = 0.45 + 0.55 * (bits >> 16 & 0xff) as f32 / 255.0;
     let channel = |shift: f32| (((hue + shift).fract() * 6.0 - 3.0).abs() - 1.0).clamp(0.0, 1.0);
     linear(Vec3::new(channel(0.0), channel(2.0 / 3.0), channel(1.0 / 3.0)) * 0.75 * value + 0.2 * value)
+}
+
+/// The color of a cell in the view of cells; black for none.
+fn cell_color(cell: Option<u64>) -> Vec3 {
+    cell.map_or(Vec3::ZERO, |cell| light_color((cell & 0xffff_ffff) as i64))
 }
 
 /// Standard error of each pixel's luminance over its value, by a logarithmic colour scale.
@@ -207,7 +232,7 @@ mod tests {
         let mut frames = renderer(&scene, &scene.parts.cameras[0], &settings).expect("valid settings");
         (0..3).for_each(|_| frames.render_frame());
         for view in View::ALL {
-            let shown = view.of(frames.film());
+            let shown = view.of(frames.as_ref());
             assert_eq!(shown.texels.len(), 40 * 30, "{}", view.name());
             assert!(shown.texels.iter().flatten().all(|v| v.is_finite()), "{}", view.name());
             assert!(

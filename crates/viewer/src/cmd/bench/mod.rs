@@ -9,6 +9,7 @@ mod scenario;
 mod stress;
 mod summary;
 
+use crate::camera_path;
 use crate::cli::{LightArgs, SizeArgs, any_method, seconds};
 use crate::exit::Status;
 use crate::interrupt::Watch;
@@ -65,6 +66,12 @@ pub(crate) struct BenchArgs {
     /// Frames of a walk, or before and after a change each
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = frame_count, requires = "scenario")]
     frames: usize,
+    /// Camera path that --scenario walk follows, as the window records it; default: one through the rooms
+    #[arg(long, value_name = "FILE", requires = "scenario")]
+    camera_path: Option<PathBuf>,
+    /// Of every frame of a scenario also measure what the window would show: with history and denoiser, by relMSE and FLIP
+    #[arg(long, requires = "scenario")]
+    displayed: bool,
     /// Runs per sampler, each with another seed; tables show medians and the spread
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
@@ -126,6 +133,10 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     if args.reference.is_some() && args.scenario.is_some() {
         bail!("--reference is one image, a scenario needs one for every state and camera: leave it away");
     }
+    if args.camera_path.is_some() && args.scenario != Some(Scenario::Walk) {
+        bail!("--camera-path is for --scenario walk: in the others the camera stays where it is");
+    }
+    let path = args.camera_path.as_deref().map(camera_path::read).transpose()?;
     if args.reference.is_some() && scenes.len() != 1 {
         bail!("--reference is for one scene, {} are given", scenes.len());
     }
@@ -141,7 +152,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         .unwrap_or_else(|| reference::default_cache(&args.output));
     session::use_threads(args.light.threads)?;
     if let Some(scenario) = args.scenario {
-        return scenario::run(args, scenario, &scenes, &methods, &settings, &cache);
+        return scenario::run(args, scenario, path.as_deref(), &scenes, &methods, &settings, &cache);
     }
 
     let contestants = Contestant::all(&settings, &methods, args.vary);

@@ -140,6 +140,16 @@ impl Reference {
         Ok(Some(Self { images, facts }))
     }
 
+    /// The best picture that there is: the mean of both halves, or the whole.
+    pub(super) fn whole(&self) -> Image {
+        let mut mean = self.images[0].clone();
+        if let Some(other) = self.images.get(1) {
+            let pairs = mean.pixels.iter_mut().zip(&other.pixels);
+            pairs.for_each(|(a, b)| *a = std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
+        }
+        mean
+    }
+
     /// The error of `image`; `None` if it has another size.
     pub(super) fn error(&self, image: &Image) -> Option<ImageError> {
         match self.images.as_slice() {

@@ -1,9 +1,9 @@
 //! The inspected pixel: a card with what is there, and lines to the lights that matter.
 
 use super::super::app::App;
-use super::super::camera_control::project;
 use super::super::views::light_color;
 use super::theme;
+use crate::clean::Projection;
 use crate::table;
 use egui::{Align2, Area, Color32, Id, LayerId, Order, Painter, Pos2, Stroke, vec2};
 use glam::Vec3;
@@ -98,6 +98,17 @@ pub(super) fn card(context: &egui::Context, app: &mut App) {
                     e.x, e.y, e.z
                 )));
             }
+            if let Some(cell) = &found.cell {
+                ui.label(theme::faint(format!(
+                    "cell {}, {:.2} m, facing {}: {} entries, {} samples, {} frames old",
+                    cell.number,
+                    cell.size_m,
+                    cell.normal,
+                    cell.entries,
+                    table::thousands(cell.samples),
+                    cell.age
+                )));
+            }
             if found.lights.is_empty() {
                 ui.label(theme::faint("no light is chosen here"));
                 return;
@@ -131,11 +142,8 @@ pub(super) fn card(context: &egui::Context, app: &mut App) {
 /// Where a point of the world is in the window, in points.
 fn on_screen(context: &egui::Context, app: &App, point_ws: Vec3) -> Option<Pos2> {
     let size = vec2(app.size.0 as f32, app.size.1 as f32) / context.pixels_per_point();
-    let share = project(
-        app.fly.camera(),
-        app.size.0.max(1) as f32 / app.size.1.max(1) as f32,
-        point_ws,
-    )?;
+    let aspect = app.size.0.max(1) as f32 / app.size.1.max(1) as f32;
+    let share = Projection::new(app.fly.camera(), aspect).share(point_ws)?;
     // Far outside lines would be so long that they are drawn wrongly.
     let near = share.abs().max_element() < 20.0;
     near.then(|| Pos2::new(share.x * size.x, share.y * size.y))

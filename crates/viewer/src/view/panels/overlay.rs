@@ -51,6 +51,20 @@ fn figures(ui: &mut egui::Ui, app: &App) {
             format!("{:.0} {:.0} {:.0} ms", times.min, times.p95, times.max),
         );
         curve(ui, &app.times.render, app.budget_ms);
+        let stages = figures.stages;
+        row(
+            ui,
+            "trace, learn",
+            format!("{:.1} {:.1} ms", stages.trace_ms, stages.learn_ms),
+        );
+        row(
+            ui,
+            "history, denoise, upload",
+            format!(
+                "{:.1} {:.1} {:.1} ms",
+                stages.history_ms, stages.denoise_ms, stages.upload_ms
+            ),
+        );
     }
     if let Some(latency) = app.times.latency.summary() {
         row(ui, "input to picture", format!("{:.0} ms", latency.median));

@@ -83,10 +83,26 @@ pub(in crate::view) struct Figures {
     pub(in crate::view) size: (u32, u32),
     /// Milliseconds of rendering per picture.
     pub(in crate::view) frame_ms: f64,
+    pub(in crate::view) stages: Stages,
     pub(in crate::view) rays_per_s: f64,
     pub(in crate::view) cells: usize,
     /// Bytes of what the sampler keeps.
     pub(in crate::view) sampler_bytes: usize,
     /// The first input that it is the first to show.
     pub(in crate::view) input: Option<Instant>,
+}
+
+/// Milliseconds of the stages of a picture, in their order.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize)]
+pub(in crate::view) struct Stages {
+    /// Tracing and shading paths, choosing lights included.
+    pub(in crate::view) trace_ms: f64,
+    /// Learning which lights matter.
+    pub(in crate::view) learn_ms: f64,
+    /// Taking over what earlier pictures knew.
+    pub(in crate::view) history_ms: f64,
+    /// Taking away the noise that is left.
+    pub(in crate::view) denoise_ms: f64,
+    /// Handing the picture to the graphics driver.
+    pub(in crate::view) upload_ms: f64,
 }

@@ -1,21 +1,25 @@
 //! `bench --scenario`: scenes and cameras that change while a sampler learns. Nothing accumulates: the error of each single
 //! frame is measured, against `exact` in the state and from the camera of that frame.
 
+mod displayed;
 mod plan;
 mod report;
 
 use super::BenchArgs;
 use super::reference::Reference;
 use super::summary::median;
+use crate::clean::Cleaner;
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::{message, output, session};
 use anyhow::Result;
 use clap::ValueEnum;
+use displayed::{Medians, Shown};
 use light_cache::SamplerKind;
 use plan::Plan;
 use render::{Method, Settings};
+use scene::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -52,6 +56,8 @@ struct Step {
     frame_ms: f64,
     /// relMSE without the worst 0.1 % of the pixels.
     error: f64,
+    /// As the window shows it, if that was asked for.
+    shown: Option<Shown>,
 }
 
 /// What one sampler did.
@@ -64,6 +70,9 @@ struct Curve {
     steady: f64,
     /// Frames after the change until the error was within [`LEARNED`] of `steady`; `None` where nothing changes at once.
     learned_after: Option<usize>,
+    /// As rendered and as the window shows it, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    displayed: Option<Medians>,
     /// By seed.
     #[serde(skip)]
     runs: Vec<(u64, Vec<Step>)>,
@@ -81,13 +90,14 @@ struct Outcome {
     curves: Vec<Curve>,
 }
 
-/// Runs the scenario on each of `scenes`.
+/// Runs the scenario on each of `scenes`; a walk goes along `path`, if there is one.
 ///
 /// # Errors
 /// Scenes that the scenario does not fit; files that cannot be written.
 pub(super) fn run(
     args: &BenchArgs,
     scenario: Scenario,
+    path: Option<&[Camera]>,
     scenes: &[String],
     methods: &[Method],
     settings: &Settings,
@@ -96,7 +106,10 @@ pub(super) fn run(
     let mut outcomes = Vec::new();
     let watch = Watch::rendering();
     for what in scenes {
-        let plan = Plan::new(scenario, what, args.light.camera.as_deref(), settings, args.frames)?;
+        let plan = match path {
+            Some(path) => Plan::along(what, &path[..args.frames.min(path.len())])?,
+            None => Plan::new(scenario, what, args.light.camera.as_deref(), settings, args.frames)?,
+        };
         message::note(format!("{what}: {}", plan.change));
         let Some(references) = references(&plan, settings, args.reference_spp, cache, &watch)? else {
             break;
@@ -107,6 +120,8 @@ pub(super) fn run(
                 let settings = Settings {
                     method,
                     seed,
+                    // What guides history and filter.
+                    aovs: args.displayed,
                     ..settings.clone()
                 };
                 runs.push((seed, drive(&plan, &references, &settings, what, &watch)?));
@@ -125,7 +140,7 @@ pub(super) fn run(
                 .collect(),
             change: plan.change,
         };
-        output::print(&report::table(&outcome))?;
+        output::print(&(report::table(&outcome) + &displayed::table(&outcome)))?;
         outcomes.push(outcome);
     }
     let interrupted = watch.writing();
@@ -177,6 +192,7 @@ fn drive(
     let pixels = u64::from(settings.width) * u64::from(settings.height);
     let mut progress = Progress::new(&format!("{what}, {}", settings.method.name()));
     let mut steps = Vec::with_capacity(plan.frames.len());
+    let mut cleaner = settings.aovs.then(Cleaner::default);
     for &next in plan.frames.iter().take_while(|_| !watch.stopped()) {
         if next.0 != now.0 {
             if built_anew {
@@ -197,6 +213,8 @@ fn drive(
         steps.push(Step {
             frame_ms,
             error: error.map_or(f64::NAN, |error| error.relmse_trimmed),
+            shown: (cleaner.as_mut())
+                .map(|cleaner| Shown::measure(cleaner, renderer.film(), &plan.views[now.1], &references[&now])),
         });
         let done = steps.len() as f64 / plan.frames.len() as f64;
         progress.update(done, steps.len() as u64, pixels);
@@ -216,6 +234,7 @@ impl Curve {
             steady,
             learned_after: if before > 0 { learned_after(after, steady) } else { None },
             errors,
+            displayed: Medians::of(&runs),
             runs,
         }
     }

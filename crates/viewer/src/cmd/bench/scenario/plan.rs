@@ -32,6 +32,22 @@ pub(super) struct Plan {
 }
 
 impl Plan {
+    /// A walk along a camera path.
+    ///
+    /// # Errors
+    /// Scenes that cannot be loaded.
+    pub(super) fn along(what: &str, views: &[Camera]) -> Result<Self> {
+        let eye = |view: &Camera| view.world_from_camera.translation;
+        let length: f32 = views.windows(2).map(|step| eye(&step[0]).distance(eye(&step[1]))).sum();
+        Ok(Self {
+            states: vec![session::load_with_warnings(what)?.scene],
+            frames: (0..views.len()).map(|view| (0, view)).collect(),
+            before: 0,
+            change: format!("{} frames of a camera path of {length:.1} m", views.len()),
+            views: views.to_vec(),
+        })
+    }
+
     /// `frames` frames of a walk, or before and after a change each.
     ///
     /// # Errors

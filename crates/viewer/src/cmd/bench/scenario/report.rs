@@ -3,6 +3,7 @@
 use super::super::plot::ERROR;
 use super::super::reference::safe_name;
 use super::super::summary::median;
+use super::displayed::Shown;
 use super::{LEARNED, Outcome};
 use crate::machine::{self, Machine};
 use crate::output;
@@ -99,12 +100,23 @@ pub(super) fn write_all(folder: &Path, settings: &Settings, outcomes: &[Outcome]
             "after_change",
             "frame_ms",
             "relmse_trimmed",
+            "relmse",
+            "flip",
+            "clean_ms",
+            "relmse_trimmed_shown",
+            "relmse_shown",
+            "flip_shown",
         ])?;
         for outcome in outcomes {
             for curve in &outcome.curves {
                 for (seed, steps) in &curve.runs {
                     for (frame, step) in steps.iter().enumerate() {
                         let after = (frame + 1).saturating_sub(outcome.before);
+                        let shown = |value: &dyn Fn(&Shown) -> f64| {
+                            step.shown
+                                .as_ref()
+                                .map_or(String::new(), |shown| value(shown).to_string())
+                        };
                         csv.write_record([
                             outcome.what.clone(),
                             outcome.scenario.name().into(),
@@ -114,6 +126,12 @@ pub(super) fn write_all(folder: &Path, settings: &Settings, outcomes: &[Outcome]
                             after.to_string(),
                             step.frame_ms.to_string(),
                             step.error.to_string(),
+                            shown(&|shown| shown.raw.relmse),
+                            shown(&|shown| shown.raw.flip),
+                            shown(&|shown| shown.clean_ms),
+                            shown(&|shown| shown.cleaned.relmse_trimmed),
+                            shown(&|shown| shown.cleaned.relmse),
+                            shown(&|shown| shown.cleaned.flip),
                         ])?;
                     }
                 }
