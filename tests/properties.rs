@@ -222,7 +222,7 @@ impl Check<'_> {
             let random = Random::new(3, index as u32, 0);
             let mut counts = vec![0_u64; lights];
             for draw in 0..draws {
-                if let Some(Choice { light, pmf }) = sampler.sample(&local, random.u32(draw)) {
+                if let Some(Choice { light, pmf, .. }) = sampler.sample(&local, random.u32(draw)) {
                     assert_eq!(
                         pmf,
                         sampler.pmf(&local, light),
@@ -283,7 +283,7 @@ impl Visitor for OnlyLight<'_> {
         let local = sampler.local(self.0, &point);
         assert_eq!(sampler.pmf(&local, 0), 1.0);
         for u in [0, 12_345, u32::MAX] {
-            assert_eq!(sampler.sample(&local, u), Some(Choice { light: 0, pmf: 1.0 }));
+            assert_eq!(sampler.sample(&local, u), Some(Choice::new(0, 1.0)));
         }
     }
 }

@@ -145,6 +145,8 @@ struct Stage {
     rays: u64,
     /// What the last frames took.
     seconds: f64,
+    /// What it took to make the last picture of what was rendered.
+    showing: Duration,
     /// Seconds of learning until the last frames, and in them.
     learned: [f64; 2],
 }
@@ -284,6 +286,7 @@ impl Worker {
             importance_told: None,
             rays: 0,
             seconds: 0.0,
+            showing: Duration::ZERO,
             learned: [0.0; 2],
         });
         Ok(())
@@ -395,7 +398,9 @@ impl Worker {
         let learn_s = stage.frames.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
         stage.learned = [learn_s, learn_s - stage.learned[0]];
 
-        let due = stage.published.is_none_or(|at| at.elapsed() >= BETWEEN_REFINEMENTS);
+        // Making a picture of what was rendered is to take a third of the time at most.
+        let between = BETWEEN_REFINEMENTS.max(stage.showing * 2);
+        let due = stage.published.is_none_or(|at| at.elapsed() >= between);
         if due || !still || stage.frames.film().spp() <= 2 {
             self.publish();
         }
@@ -407,6 +412,7 @@ impl Worker {
 
     /// Hands the picture over.
     fn publish(&mut self) {
+        let start = Instant::now();
         let Some(stage) = &mut self.stage else { return };
         let film = stage.frames.film();
         let (width, height) = (film.width(), film.height());
@@ -448,6 +454,7 @@ impl Worker {
         };
         stage.rays = rays;
         stage.published = Some(Instant::now());
+        stage.showing = start.elapsed();
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(picture);
         (self.tell)(Report::Picture);
     }

@@ -52,18 +52,11 @@ fn figures(ui: &mut egui::Ui, app: &App) {
         );
         curve(ui, &app.times.render, app.budget_ms);
         let stages = figures.stages;
-        row(
-            ui,
-            "trace, learn",
-            format!("{:.1} {:.1} ms", stages.trace_ms, stages.learn_ms),
-        );
+        row(ui, "trace, learn", milliseconds(&[stages.trace_ms, stages.learn_ms]));
         row(
             ui,
             "history, denoise, upload",
-            format!(
-                "{:.1} {:.1} {:.1} ms",
-                stages.history_ms, stages.denoise_ms, stages.upload_ms
-            ),
+            milliseconds(&[stages.history_ms, stages.denoise_ms, stages.upload_ms]),
         );
     }
     if let Some(latency) = app.times.latency.summary() {
@@ -104,6 +97,18 @@ fn figures(ui: &mut egui::Ui, app: &App) {
     let adapter = app.display.as_ref().map_or("", |display| display.adapter());
     ui.label(theme::faint(format!("rendered on the CPU, shown by {adapter}")));
     ui.label(theme::faint("F1 all keys"));
+}
+
+/// Several times in a row, as short as they are still of use.
+fn milliseconds(times: &[f64]) -> String {
+    let short = |ms: &f64| {
+        if *ms < 10.0 {
+            format!("{ms:.1} ")
+        } else {
+            format!("{ms:.0} ")
+        }
+    };
+    times.iter().map(short).collect::<String>() + "ms"
 }
 
 fn row(ui: &mut egui::Ui, what: &str, value: String) {
