@@ -25,7 +25,7 @@ Examples:
   manylight dump hall.glb -o - --top 10               the ten lights that matter most, as CSV
   manylight bench demo:rooms --samplers power,table   how fast does the error fall?
 
-Exit codes: 0 done, 1 a comparison was above its threshold, 2 bad usage or input, 3 no suitable GPU,
+Exit codes: 0 done, 1 a comparison or check failed, 2 bad usage or input, 3 no suitable GPU,
 4 out of memory, 130 interrupted (what is there is written first)."
 )]
 pub(crate) struct Cli {

@@ -35,6 +35,7 @@ Examples:
   manylight render hall.glb -o hall.exr --spp 256 --max-bounces 4 --camera 1 --aov albedo,normal,variance
   manylight render hall.glb --camera-path path.json --frames 0..90 --spp 32 -o walk_####.png
   manylight render hall.glb -o hall.exr --display-server localhost:14158    (watch it in tev)
+  manylight render hall.glb -o hall.exr --spp 4096 --resume hall.state      (stop it, and run it again to go on)
 
 EXR files are linear, float32, in the scene's own units, with all settings in their metadata; PNG files are tone-mapped.
 Ctrl-C writes what is there and exits with 130.")]
