@@ -13,6 +13,7 @@ mod exact;
 pub mod film;
 mod filter;
 pub mod frame;
+pub mod gpu;
 pub mod image;
 pub mod metric;
 mod oracle;
@@ -22,7 +23,7 @@ mod resampling;
 pub mod settings;
 
 pub use choosing::Choosing;
-pub use error::RenderError;
+pub use error::{GpuFault, RenderError};
 pub use film::{Film, Image};
 pub use frame::{FrameLoop, RenderStats, SceneRef, renderer};
 pub use metric::ImageError;

@@ -20,6 +20,7 @@ pub mod instance;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod packed;
 mod relight;
 pub mod report;
 mod scene;

@@ -132,7 +132,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
         output::check_writable(path)?;
     }
-    let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)))?;
+    let mut settings = args.light.settings_anywhere(args.sampler, args.size.or((1280, 720)));
     settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
     settings.check()?;
     if settings.light.ignore_below > 0.0 {
@@ -143,7 +143,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let loaded = session::load_with_warnings(&args.scene)?;
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
-    let mut frames = session::start(&loaded.scene, camera, &settings)?;
+    let (mut frames, backend) = session::start_on(args.light.backend, &loaded.scene, camera, &settings)?;
     let title = format!("manylight {}", loaded.scene.parts.name);
     let mut display = args
         .display_server
@@ -154,7 +154,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         if let Some(display) = &mut display {
             display.update(|| state.film().image());
         }
-    });
+    })?;
 
     let interrupted = watch.writing();
     let image = frames.film().image();
@@ -164,7 +164,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let run = frames.stats();
     // Measuring takes about as long as a frame: only where somebody will read the result.
     let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
-    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted);
+    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted, backend);
     match format {
         Format::Png => {
             let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
