@@ -416,35 +416,45 @@ fn first_of_two(descent: Descent, width: vec2<u32>) -> TwoStandings {
 }
 
 // twin: crates/light-cache/src/tree/sample.rs draw
-fn descent_draw(descent: Descent, x: vec2<u32>, width: vec2<u32>) -> Drawn {
-    let near = split(width, descent.near, descent.far);
-    if !wide_less(x, near) {
-        return draw_distant(descent.tree, descent.at, wide_sub(x, near), wide_sub(width, near));
+fn descent_draw(descent: Descent, position: vec2<u32>, interval: vec2<u32>) -> Drawn {
+    var x = position;
+    var width = split(interval, descent.near, descent.far);
+    if !wide_less(x, width) {
+        return draw_distant(descent.tree, descent.at, wide_sub(x, width), wide_sub(interval, width));
     }
-    let two = first_of_two(descent, near);
-    if two.first == NO_NODE {
-        return draw_in_node(descent.tree, descent.at, 0u, x, near);
+    let two = first_of_two(descent, width);
+    var start = 0u;
+    if two.first != NO_NODE {
+        start = two.first;
+        if wide_less(x, two.left) {
+            width = two.left;
+        } else {
+            start += 1u;
+            x = wide_sub(x, two.left);
+            width = wide_sub(width, two.left);
+        }
     }
-    if wide_less(x, two.left) {
-        return draw_in_node(descent.tree, descent.at, two.first, x, two.left);
-    }
-    return draw_in_node(descent.tree, descent.at, two.first + 1u, wide_sub(x, two.left), wide_sub(near, two.left));
+    return draw_in_node(descent.tree, descent.at, start, x, width);
 }
 
 // twin: crates/light-cache/src/tree/sample.rs width_of
-fn descent_width(descent: Descent, place: u32, width: vec2<u32>) -> vec2<u32> {
-    let near = split(width, descent.near, descent.far);
+fn descent_width(descent: Descent, place: u32, interval: vec2<u32>) -> vec2<u32> {
+    var width = split(interval, descent.near, descent.far);
     if place >= cache_word(descent.tree + TREE_LEAF_COUNT) {
-        return width_of_distant(descent.tree, descent.at, place, wide_sub(width, near));
+        return width_of_distant(descent.tree, descent.at, place, wide_sub(interval, width));
     }
-    let two = first_of_two(descent, near);
-    if two.first == NO_NODE {
-        return width_in_node(descent.tree, descent.at, 0u, place, near);
+    let two = first_of_two(descent, width);
+    var start = 0u;
+    if two.first != NO_NODE {
+        start = two.first;
+        if place < tree_node(descent.tree, two.first + 1u).first {
+            width = two.left;
+        } else {
+            start += 1u;
+            width = wide_sub(width, two.left);
+        }
     }
-    if place < tree_node(descent.tree, two.first + 1u).first {
-        return width_in_node(descent.tree, descent.at, two.first, place, two.left);
-    }
-    return width_in_node(descent.tree, descent.at, two.first + 1u, place, wide_sub(near, two.left));
+    return width_in_node(descent.tree, descent.at, start, place, width);
 }
 
 // twin: crates/light-cache/src/tree/mod.rs light_at

@@ -121,87 +121,66 @@ fn observe(vertex: Vertex, light: u32, pmf: f32, connection: Connection, visible
     (*log).observations += 1u;
 }
 
-// Remembers the first light that is chosen at the first hit.
-fn note_light(vertex: Vertex, light: u32, log: ptr<function, Log>) {
-    if vertex.point.primary && (*log).light == NONE {
-        (*log).light = light;
-    }
-}
-
-fn is_visible(vertex: Vertex, connection: Connection, log: ptr<function, Log>) -> bool {
-    (*log).rays_occluded += 1u;
-    return !occluded(connection.shadow_ray, vertex.surface.id, connection.to_id);
-}
-
-// One light, chosen by the sampler.
+// One light, chosen by the sampler; at glossy surfaces one of several, kept by how it is reflected. One more round makes the
+// connection of the kept one again: cheaper than to keep them all, and connections are made in one place.
 // twin: crates/render/src/direct.rs estimate
-fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32, log: ptr<function, Log>) -> vec3<f32> {
-    if RESAMPLES && vertex.candidates > 1u {
-        return resampled_light(local, vertex, numbers, count, log);
-    }
-    let choice = sampler_draw(local, numbers.choice);
-    if !(choice.pmf > 0.0) {
-        return vec3<f32>(0.0);
-    }
-    note_light(vertex, choice.light, log);
-    let on_light = vec2<f32>(unit_f32(numbers.point.x), unit_f32(numbers.point.y));
-    let connection = connect(vertex, choice.light, count * choice.pmf, on_light);
-    let visible = connection.exists && is_visible(vertex, connection, log);
-    observe(vertex, choice.light, choice.pmf, connection, visible, log);
-    if visible {
-        return connection.unweighted * (connection.weight / (count * choice.pmf));
-    }
-    return vec3<f32>(0.0);
-}
-
-// One of several lights, kept by how it is reflected: see crates/render/src/resampling.rs. Connections are made again for the one
-// that is kept: cheaper than to keep them all.
 // twin: crates/render/src/resampling.rs estimate
-fn resampled_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32, log: ptr<function, Log>) -> vec3<f32> {
+fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32, log: ptr<function, Log>) -> vec3<f32> {
     let on_light = vec2<f32>(unit_f32(numbers.point.x), unit_f32(numbers.point.y));
-    let tried = count * f32(vertex.candidates);
+    let candidates = vertex.candidates;
+    let tried = count * f32(candidates);
     let salt = hash3(numbers.choice, numbers.point.x, numbers.point.y);
     var choices: array<Choice, MAX_CANDIDATES>;
     var shares: array<f32, MAX_CANDIDATES>;
     var total = 0.0;
     var any = NONE;
-    for (var part = 0u; part < vertex.candidates; part++) {
-        let u = wide_div(vec2<u32>(hash2(salt, part), part), vertex.candidates);
-        choices[part] = sampler_draw(local, u);
-        if choices[part].pmf > 0.0 {
-            any = min(any, part);
-            let connection = connect(vertex, choices[part].light, tried * choices[part].pmf, on_light);
-            if connection.exists {
-                shares[part] = reflected_share(connection);
-                total += shares[part];
-            }
-        }
-    }
-    if any == NONE {
-        return vec3<f32>(0.0);
-    }
-    if !(total > 0.0 && is_finite(total)) {
-        var nothing: Connection;
-        observe(vertex, choices[any].light, choices[any].pmf, nothing, false, log);
-        return vec3<f32>(0.0);
-    }
-    // twin: crates/render/src/resampling.rs keep
-    var rest = unit_f32(numbers.choice) * total;
     var kept = 0u;
-    for (var index = 0u; index < vertex.candidates; index++) {
-        if shares[index] > 0.0 {
-            kept = index;
-            if rest < shares[index] {
+    var connection: Connection;
+    for (var part = 0u; part <= candidates; part++) {
+        if part < candidates {
+            var u = numbers.choice;
+            if candidates > 1u {
+                u = wide_div(vec2<u32>(hash2(salt, part), part), candidates);
+            }
+            choices[part] = sampler_draw(local, u);
+            if !(choices[part].pmf > 0.0) {
+                continue;
+            }
+            any = min(any, part);
+            kept = part;
+        } else {
+            if any == NONE {
+                return vec3<f32>(0.0);
+            }
+            if candidates == 1u {
                 break;
             }
-            rest -= shares[index];
+            if !(total > 0.0 && is_finite(total)) {
+                connection.exists = false;
+                kept = any;
+                break;
+            }
+            kept = kept_candidate(shares, candidates, unit_f32(numbers.choice) * total);
+        }
+        connection = connect(vertex, choices[kept].light, tried * choices[kept].pmf, on_light);
+        if RESAMPLES && candidates > 1u && part < candidates && connection.exists {
+            shares[part] = reflected_share(connection);
+            total += shares[part];
         }
     }
     let choice = choices[kept];
-    let pmf = choice.pmf * (f32(vertex.candidates) * (shares[kept] / total));
-    note_light(vertex, choice.light, log);
-    let connection = connect(vertex, choice.light, tried * choice.pmf, on_light);
-    let visible = is_visible(vertex, connection, log);
+    var pmf = choice.pmf;
+    if RESAMPLES && candidates > 1u && connection.exists {
+        pmf *= f32(candidates) * (shares[kept] / total);
+    }
+    if vertex.point.primary && (*log).light == NONE {
+        (*log).light = choice.light;
+    }
+    var visible = false;
+    if connection.exists {
+        (*log).rays_occluded += 1u;
+        visible = !occluded(connection.shadow_ray, vertex.surface.id, connection.to_id);
+    }
     observe(vertex, choice.light, pmf, connection, visible, log);
     if visible {
         return connection.unweighted * (connection.weight / (count * pmf));
@@ -209,12 +188,28 @@ fn resampled_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f
     return vec3<f32>(0.0);
 }
 
+// twin: crates/render/src/resampling.rs keep
+fn kept_candidate(shares: array<f32, MAX_CANDIDATES>, candidates: u32, position: f32) -> u32 {
+    var each = shares;
+    var rest = position;
+    var kept = 0u;
+    for (var index = 0u; index < candidates; index++) {
+        if each[index] > 0.0 {
+            kept = index;
+            if rest < each[index] {
+                break;
+            }
+            rest -= each[index];
+        }
+    }
+    return kept;
+}
+
 // The radiance that one path brings back.
 // twin: crates/render/src/path.rs path
 fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32> {
     var ray = eye_ray;
-    (*log).rays_nearest += 1u;
-    var hit = nearest(ray, NO_PRIMITIVE);
+    var from_id = NO_PRIMITIVE;
     var radiance = vec3<f32>(0.0);
     var throughput = vec3<f32>(1.0);
     // The vertex that the path has left.
@@ -223,7 +218,12 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
     var left_pdf = 0.0;
     var lights_tried = 0.0;
     var bounce = 0u;
-    while hit.id.x != NONE {
+    loop {
+        (*log).rays_nearest += 1u;
+        let hit = nearest(ray, from_id);
+        if hit.id.x == NONE {
+            break;
+        }
         let surface = surface_at(ray, hit);
 
         // Its emission, weighed against the chance that light sampling at the vertex before had found it.
@@ -256,7 +256,7 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
             throughput,
             point,
             shared_with_bsdf && continues,
-            select(1u, frame.candidates, glossy),
+            select(1u, frame.candidates, RESAMPLES && glossy),
         );
         let count = select(1u, frame.light_samples, bounce == 0u);
         if scene.light_count > 0u {
@@ -294,10 +294,8 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
         left_position_ws = surface.position_ws;
         left_pdf = sample.pdf;
         lights_tried = f32(count * vertex.candidates);
+        from_id = surface.id;
         bounce += 1u;
-
-        (*log).rays_nearest += 1u;
-        hit = nearest(ray, surface.id);
     }
     return radiance;
 }

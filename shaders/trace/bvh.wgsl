@@ -12,9 +12,9 @@ const ONE_SIDED: u32 = 0x80000000u;
 const MASKED: u32 = 0x40000000u;
 const TRIANGLE_INDEX: u32 = 0x3fffffffu;
 
-// Entries of the stacks: crates/render/src/gpu/scene.rs refuses trees that need more.
-const STACK: u32 = 128u;
-const TOP_STACK: u32 = 96u;
+// Entries of the stack: trees that need more are refused.
+// twin: crates/render/src/gpu/scene.rs STACK
+const STACK: u32 = 160u;
 
 // A ray in the space of what it is tested against.
 // twin: crates/scene/src/bvh/kernel/mod.rs LocalRay
@@ -101,7 +101,7 @@ struct Target {
 
 // Woop, Benthin and Wald 2013, "Watertight Ray/Triangle Intersection".
 // twin: crates/scene/src/bvh/kernel/portable.rs triangles
-fn test_pack(pack: u32, ray: LocalRay, target_of: Target, best: ptr<function, Hit>) -> bool {
+fn test_pack(pack: u32, ray: LocalRay, tested: Target, best: ptr<function, Hit>) -> bool {
     var found = false;
     let base = pack * 20u;
     for (var half = 0u; half < 2u; half++) {
@@ -136,13 +136,13 @@ fn test_pack(pack: u32, ray: LocalRay, target_of: Target, best: ptr<function, Hi
             let tag = tags[lane];
             let triangle = tag & TRIANGLE_INDEX;
             let hidden = (tag & ONE_SIDED) != 0u && det[lane] < 0.0;
-            if hidden || triangle == target_of.skip.x || triangle == target_of.skip.y {
+            if hidden || triangle == tested.skip.x || triangle == tested.skip.y {
                 continue;
             }
-            if HAS_MASKS && (tag & MASKED) != 0u && !mask_visible(target_of.instance, triangle, u[lane], v[lane]) {
+            if HAS_MASKS && (tag & MASKED) != 0u && !mask_visible(tested.instance, triangle, u[lane], v[lane]) {
                 continue;
             }
-            *best = Hit(t[lane], u[lane], v[lane], vec2<u32>(target_of.instance, triangle));
+            *best = Hit(t[lane], u[lane], v[lane], vec2<u32>(tested.instance, triangle));
             found = true;
         }
     }
@@ -153,20 +153,41 @@ fn pack_tags(base: u32, half: u32) -> vec4<u32> {
     return packs[base + 18u + half];
 }
 
-// Walks one mesh's tree; `any`: the first hit ends it.
+fn skip_in(instance: u32, from_id: vec2<u32>, to_id: vec2<u32>) -> vec2<u32> {
+    return vec2<u32>(
+        select(NONE, from_id.y, from_id.x == instance),
+        select(NONE, to_id.y, to_id.x == instance),
+    );
+}
+
+// What is placed once first, then the tree over the instances and those that the ray meets: one loop and one stack for all, because
+// shader compilers inline every call. `any`: the first hit ends it.
 // twin: crates/scene/src/bvh/traverse.rs walk
-fn walk(root: u32, ray: LocalRay, target_of: Target, any: bool, best: ptr<function, Hit>) {
+fn trace(ray: Ray, from_id: vec2<u32>, to_id: vec2<u32>, any: bool) -> Hit {
+    var best = Hit(ray.t_max, 0.0, 0.0, NO_PRIMITIVE);
     var stack: array<u32, STACK>;
     var distances: array<f32, STACK>;
     var height = 0u;
-    var current = root;
+    // The stack's height where the present tree began.
+    var base = 0u;
+    let world = local_ray(ray.origin_ws, ray.direction_ws);
+    var local = world;
+    var tested = Target(0u, skip_in(0u, from_id, to_id));
+    var current = scene.fixed_root;
+    var in_top = false;
+    var top_begun = !HAS_INSTANCES || scene.top_root == NONE;
+    if current == NONE {
+        if top_begun {
+            return best;
+        }
+        current = scene.top_root;
+        in_top = true;
+        top_begun = true;
+    }
     loop {
-        if (current & LEAF) != 0u {
-            if test_pack(current & ~LEAF, ray, target_of, best) && any {
-                return;
-            }
-        } else {
-            var boxes = test_boxes(current, ray, (*best).t);
+        var enters = false;
+        if (current & LEAF) == 0u {
+            let boxes = test_boxes(current, local, best.t);
             var last = MISSED;
             let bottom = height;
             for (var lane = 0u; lane < 8u; lane++) {
@@ -199,74 +220,46 @@ fn walk(root: u32, ray: LocalRay, target_of: Target, any: bool, best: ptr<functi
                 distances[at] = distance;
                 height += 1u;
             }
-            if last < MISSED {
-                continue;
-            }
-        }
-        loop {
-            if height == 0u {
-                return;
-            }
-            height -= 1u;
-            if distances[height] <= (*best).t {
-                break;
-            }
-        }
-        current = stack[height];
-    }
-}
-
-fn skip_in(instance: u32, from_id: vec2<u32>, to_id: vec2<u32>) -> vec2<u32> {
-    return vec2<u32>(
-        select(NONE, from_id.y, from_id.x == instance),
-        select(NONE, to_id.y, to_id.x == instance),
-    );
-}
-
-// Walks the tree over the placed instances, and those that the ray meets.
-fn walk_placed(ray: Ray, from_id: vec2<u32>, to_id: vec2<u32>, any: bool, best: ptr<function, Hit>) {
-    var stack: array<u32, TOP_STACK>;
-    var height = 0u;
-    var current = scene.top_root;
-    let world = local_ray(ray.origin_ws, ray.direction_ws);
-    loop {
-        if (current & LEAF) != 0u {
+            enters = last < MISSED;
+        } else if HAS_INSTANCES && in_top {
             let placed = scene.placed + 2u * (current & ~LEAF);
             let root = details[placed + 1u];
             if root != NONE {
                 let instance = details[placed];
                 let at = instance_at(instance) + LOCAL_FROM_WORLD;
                 let matrix = matrix_at(at);
-                let local = local_ray(matrix * ray.origin_ws + detail_vec3(at + 9u), matrix * ray.direction_ws);
-                walk(root, local, Target(instance, skip_in(instance, from_id, to_id)), any, best);
-                if any && (*best).id.x != NONE {
-                    return;
+                local = local_ray(matrix * ray.origin_ws + detail_vec3(at + 9u), matrix * ray.direction_ws);
+                tested = Target(instance, skip_in(instance, from_id, to_id));
+                current = root;
+                base = height;
+                in_top = false;
+                enters = true;
+            }
+        } else if test_pack(current & ~LEAF, local, tested, &best) && any {
+            return best;
+        }
+        while !enters {
+            if height == base && !in_top {
+                // This mesh is done.
+                if !HAS_INSTANCES {
+                    return best;
+                }
+                local = world;
+                base = 0u;
+                in_top = true;
+                if !top_begun {
+                    top_begun = true;
+                    current = scene.top_root;
+                    break;
                 }
             }
-        } else {
-            var boxes = test_boxes(current, world, (*best).t);
-            for (var lane = 0u; lane < 8u; lane++) {
-                if boxes.enter[lane >> 2u][lane & 3u] < MISSED {
-                    stack[height] = boxes.children[lane >> 2u][lane & 3u];
-                    height += 1u;
-                }
+            if height == 0u {
+                return best;
             }
+            height -= 1u;
+            current = stack[height];
+            enters = distances[height] <= best.t;
         }
-        if height == 0u {
-            return;
-        }
-        height -= 1u;
-        current = stack[height];
-    }
-}
-
-fn trace(ray: Ray, from_id: vec2<u32>, to_id: vec2<u32>, any: bool) -> Hit {
-    var best = Hit(ray.t_max, 0.0, 0.0, NO_PRIMITIVE);
-    if scene.fixed_root != NONE {
-        walk(scene.fixed_root, local_ray(ray.origin_ws, ray.direction_ws), Target(0u, skip_in(0u, from_id, to_id)), any, &best);
-    }
-    if HAS_INSTANCES && scene.top_root != NONE && !(any && best.id.x != NONE) {
-        walk_placed(ray, from_id, to_id, any, &best);
     }
     return best;
 }

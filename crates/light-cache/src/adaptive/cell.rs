@@ -257,6 +257,21 @@ impl Cell {
         self.subcells.refresh(&self.counts(), false);
     }
 
+    /// The learned weights.
+    pub(super) fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// First light of each entry, in tree order.
+    pub(super) fn firsts(&self) -> &[u32] {
+        &self.firsts
+    }
+
+    /// See [`SubCells::factors_by_cube`].
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, &[Lanes])> {
+        self.subcells.factors_by_cube()
+    }
+
     /// How many of its cubes anything was seen in.
     pub(super) fn cubes(&self) -> usize {
         self.subcells.len()

@@ -32,6 +32,16 @@ impl Cells {
         }
     }
 
+    /// What finds the cells.
+    pub(super) fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The cells, by number.
+    pub(super) fn all(&self) -> &[Cell] {
+        &self.cells
+    }
+
     /// Number of cells.
     pub(super) fn len(&self) -> usize {
         self.cells.len()

@@ -133,6 +133,12 @@ impl Gpu {
         Some(fault.error(what))
     }
 
+    /// What is told of a device that gives no results without saying why.
+    pub(crate) fn gone(&self) -> RenderError {
+        let what = format!("{} gives no results; try again, or use --backend cpu", self.info);
+        GpuFault::Lost(String::new()).error(what)
+    }
+
     /// Waits until everything that was submitted is done; false if the device is lost.
     pub(crate) fn wait(&self) -> bool {
         let done = self.device.poll(wgpu::PollType::wait_indefinitely());

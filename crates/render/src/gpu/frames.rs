@@ -68,9 +68,9 @@ impl<S: LightSampler> GpuFrames<S> {
         );
         let cache = storage(&gpu, "light sampler", bytemuck::cast_slice(&packed.words))?;
         let frames = Self {
-            frame_group: group(&gpu, &pipeline, 0, &[&params, &sobol]),
-            scene_group: group(&gpu, &pipeline, 1, &buffers.buffers.each_ref()),
-            cache_group: group(&gpu, &pipeline, 2, &[&cache]),
+            frame_group: group(&gpu, &pipeline, 0, &[(0, &params), (1, &sobol)]),
+            scene_group: group(&gpu, &pipeline, 1, &buffers.bindings()),
+            cache_group: group(&gpu, &pipeline, 2, &[(0, &cache)]),
             drawn: Drawn::new(OneLight(sampler)),
             gpu,
             pipeline,
@@ -100,7 +100,7 @@ impl<S: LightSampler> GpuFrames<S> {
             "observations of a frame",
             pixels * u64::from(slots) * size_of::<PackedObservation>() as u64,
         )?;
-        let group = group(&self.gpu, &self.pipeline, 3, &[&film, &observations]);
+        let group = group(&self.gpu, &self.pipeline, 3, &[(0, &film), (1, &observations)]);
         Ok(Target {
             pixels,
             film,
@@ -198,16 +198,14 @@ impl<S: LightSampler> GpuFrames<S> {
             self.gpu.queue.write_buffer(&self.cache, 0, bytes);
         } else {
             self.cache = storage(&self.gpu, "light sampler", bytes)?;
-            self.cache_group = group(&self.gpu, &self.pipeline, 2, &[&self.cache]);
+            self.cache_group = group(&self.gpu, &self.pipeline, 2, &[(0, &self.cache)]);
         }
         Ok(())
     }
 
     /// Why nothing goes on.
     fn lost(&self) -> RenderError {
-        self.gpu.error().unwrap_or_else(|| {
-            crate::error::GpuFault::Lost(String::new()).error("the GPU gives no results; use --backend cpu".into())
-        })
+        self.gpu.error().unwrap_or_else(|| self.gpu.gone())
     }
 
     /// [`GpuFrames::read_film`], once after every frame.
@@ -236,11 +234,16 @@ impl<S: LightSampler> GpuFrames<S> {
     }
 }
 
-/// The bind group `index` of `pipeline`: `buffers` in the order of their bindings.
-fn group(gpu: &Gpu, pipeline: &wgpu::ComputePipeline, index: u32, buffers: &[&wgpu::Buffer]) -> wgpu::BindGroup {
-    let entries: Vec<_> = (0..)
-        .zip(buffers)
-        .map(|(binding, buffer)| wgpu::BindGroupEntry {
+/// The bind group `index` of `pipeline`: buffers by their bindings.
+pub(super) fn group(
+    gpu: &Gpu,
+    pipeline: &wgpu::ComputePipeline,
+    index: u32,
+    buffers: &[(u32, &wgpu::Buffer)],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = buffers
+        .iter()
+        .map(|&(binding, buffer)| wgpu::BindGroupEntry {
             binding,
             resource: buffer.as_entire_binding(),
         })
@@ -327,7 +330,7 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
     fn scene_changed(&mut self, scene: &Scene) {
         self.drawn.scene_changed(scene);
         let uploaded = SceneBuffers::new(&self.gpu, scene).and_then(|buffers| {
-            self.scene_group = group(&self.gpu, &self.pipeline, 1, &buffers.buffers.each_ref());
+            self.scene_group = group(&self.gpu, &self.pipeline, 1, &buffers.bindings());
             self.upload_sampler()
         });
         if let Err(error) = uploaded {

@@ -11,11 +11,13 @@
 mod buffers;
 mod device;
 mod frames;
+mod kernel;
 mod layout;
 mod scene;
 mod shader;
 
 pub use device::{AdapterInfo, Gpu, adapters};
+pub use kernel::Kernel;
 pub use layout::{FilmPixel, FrameParams, PackedObservation};
 pub use shader::{files, link};
 

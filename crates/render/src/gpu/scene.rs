@@ -7,14 +7,13 @@ use crate::error::GpuFault;
 use ::scene::Scene;
 use ::scene::packed::NONE;
 
-/// Entries of the stacks in `shaders/trace/bvh.wgsl`.
-const STACK: usize = 128;
-const TOP_STACK: usize = 96;
+/// Entries of the stack in `shaders/trace/bvh.wgsl`.
+const STACK: usize = 160;
 
 /// The scene's buffers, in the order of their bindings.
 #[derive(Debug)]
 pub(super) struct SceneBuffers {
-    pub(super) buffers: [wgpu::Buffer; 6],
+    buffers: [wgpu::Buffer; 6],
     /// Values of the shaders' switches: what the scene lacks is not compiled.
     pub(super) switches: [(&'static str, bool); 3],
 }
@@ -27,7 +26,7 @@ impl SceneBuffers {
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self, RenderError> {
         let too_large = |what: &str| GpuFault::OutOfMemory.error(format!("{what}; use --backend cpu"));
         let flat = scene.bvh().flat();
-        if flat.stack > STACK || flat.top_stack > TOP_STACK {
+        if flat.stack + flat.top_stack > STACK {
             return Err(too_large("the scene's tree is deeper than the GPU back end walks"));
         }
         let packed = scene
@@ -49,5 +48,10 @@ impl SceneBuffers {
                 ("HAS_DETAIL", packed.has_detail),
             ],
         })
+    }
+
+    /// The buffers with their bindings in group 1.
+    pub(super) fn bindings(&self) -> Vec<(u32, &wgpu::Buffer)> {
+        (0..).zip(&self.buffers).collect()
     }
 }

@@ -22,9 +22,12 @@ const FILES: &[(&str, &str)] = files![
     "lib/sequence.wgsl",
     "lib/triangle.wgsl",
     "lib/wide.wgsl",
+    "light_cache/adaptive.wgsl",
     "light_cache/bindings.wgsl",
+    "light_cache/cut.wgsl",
     "light_cache/discrete.wgsl",
     "light_cache/distribution.wgsl",
+    "light_cache/grid.wgsl",
     "light_cache/light_tree.wgsl",
     "light_cache/tree.wgsl",
     "light_cache/uniform.wgsl",
@@ -101,7 +104,7 @@ mod tests {
 
     #[test]
     fn every_pass_links_and_is_valid_with_every_sampler() {
-        for scheme in [Scheme::Uniform, Scheme::Discrete, Scheme::Tree] {
+        for scheme in [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive] {
             let text = pass("path", scheme).expect("links");
             let module = match wgpu::naga::front::wgsl::parse_str(&text) {
                 Ok(module) => module,
