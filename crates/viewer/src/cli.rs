@@ -26,7 +26,7 @@ Examples:
   manylight bench demo:rooms --samplers power,table   how fast does the error fall?
 
 Exit codes: 0 done, 1 a comparison was above its threshold, 2 bad usage or input, 3 no suitable GPU,
-4 out of memory, 130 interrupted (what is there is written first)."
+4 out of memory or GPU lost, 130 interrupted (what is there is written first)."
 )]
 pub(crate) struct Cli {
     /// What to do.
