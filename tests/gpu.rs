@@ -59,7 +59,15 @@ const ASKED: u32 = 1 << 13;
 
 impl Ask<'_> {
     fn point(&self, i: u32) -> ShadingPoint {
-        let random = Random::new(8, if self.one_point { 3 } else { i % 1024 }, 0);
+        if self.one_point {
+            // Below the lamps.
+            return ShadingPoint {
+                position_ws: self.scene.center_ws,
+                normal_ws: Vec3::Y,
+                primary: true,
+            };
+        }
+        let random = Random::new(8, i % 1024, 0);
         let spread = |d| 2.0 * random.f32(d) - 1.0;
         ShadingPoint {
             position_ws: self.scene.center_ws + 0.5 * self.scene.radius * Vec3::new(spread(0), spread(1), spread(2)),

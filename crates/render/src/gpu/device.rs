@@ -151,7 +151,7 @@ impl Gpu {
     /// Why a binding of so many bytes is impossible, if it is.
     pub(crate) fn refuses(&self, what: &str, bytes: u64) -> Option<RenderError> {
         let limits = self.device.limits();
-        let most = u64::from(limits.max_storage_buffer_binding_size).min(limits.max_buffer_size);
+        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         (bytes > most).then(|| {
             let mib = |bytes: u64| bytes.div_ceil(1 << 20);
             GpuFault::OutOfMemory.error(format!(
