@@ -4,10 +4,16 @@
 mod cli;
 /// Scenes whose image is known in closed form.
 mod closed_form;
+/// The GPU back end against the CPU.
+mod gpu;
+/// Records that Rust and the shaders share.
+mod layout;
 /// What must hold for any scene: invariances, degenerate inputs, threads, probabilities.
 mod properties;
 /// A million lights.
 mod scale;
+/// Functions that Rust and the shaders share.
+mod twins;
 /// Every sampler against `exact`.
 mod unbiased;
 /// The window, driven by scripts.

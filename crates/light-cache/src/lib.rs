@@ -13,6 +13,7 @@ mod belief;
 mod brightness;
 mod dispatch;
 mod octree;
+mod packed;
 mod power;
 mod records;
 mod schedule;
@@ -32,6 +33,7 @@ use std::fmt::Debug;
 pub use adaptive::AdaptiveSampler;
 pub use dispatch::{Visitor, build};
 pub use octree::OctreeSampler;
+pub use packed::{Packed, Scheme};
 pub use power::PowerSampler;
 pub use records::Recording;
 pub use settings::{SamplerKind, Settings};
@@ -254,6 +256,11 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// What it knows about each light, in the order of [`Scene::lights`].
     fn records(&self, scene: &Scene) -> Vec<LightRecord>;
+
+    /// It as words, with which another back end draws the same lights; `None` if none can.
+    fn pack(&self) -> Option<Packed> {
+        None
+    }
 
     /// What it has learned in each cell; none for samplers without cells.
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {

@@ -1,7 +1,7 @@
 //! In proportion to emitted power.
 
 use crate::records;
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, Settings, ShadingPoint};
+use crate::{Choice, LightRecord, LightSampler, Observation, Packed, SamplerStats, Scheme, Settings, ShadingPoint};
 use sampling::Discrete;
 use scene::{Light, Scene};
 use std::time::Instant;
@@ -57,6 +57,16 @@ impl LightSampler for PowerSampler {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         records::of_sampler(self, scene, &[])
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        let mut words = vec![0; 2];
+        let at = self.distribution.as_ref()?.pack(&mut words);
+        words[..2].fill(at);
+        Some(Packed {
+            scheme: Scheme::Discrete,
+            words,
+        })
     }
 }
 

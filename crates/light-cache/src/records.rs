@@ -1,6 +1,6 @@
 //! What `dump` writes about each light, and a wrapper that gathers it around any sampler.
 
-use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
+use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, ShadingPoint};
 use glam::Vec3;
 use sampling::hemisphere::uniform_sphere;
 use sampling::{Random, unit_f32};
@@ -172,6 +172,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
 
     fn stats(&self) -> SamplerStats {
         self.inner.stats()
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        self.inner.pack()
     }
 
     fn cells(&self, scene: &Scene) -> Vec<CellRecord> {

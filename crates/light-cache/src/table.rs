@@ -12,7 +12,8 @@ use crate::belief::chance_visible;
 use crate::brightness::Brightness;
 use crate::schedule::Schedule;
 use crate::{
-    Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint, records, state,
+    Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Scheme, Settings, ShadingPoint,
+    records, state,
 };
 use glam::Vec3;
 use sampling::Discrete;
@@ -348,6 +349,17 @@ impl LightSampler for TableSampler {
             }),
             ..SamplerStats::default()
         }
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        let mut words = vec![0; 2];
+        for (header, primary) in [(0, true), (1, false)] {
+            words[header] = self.table(primary).distribution.as_ref()?.pack(&mut words);
+        }
+        Some(Packed {
+            scheme: Scheme::Discrete,
+            words,
+        })
     }
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {

@@ -1,7 +1,7 @@
 //! Every light alike.
 
 use crate::records;
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use crate::{Choice, LightRecord, LightSampler, Observation, Packed, SamplerStats, Scheme, ShadingPoint};
 use sampling::discrete::TOTAL;
 use scene::{Light, Scene};
 
@@ -87,6 +87,25 @@ impl LightSampler for UniformSampler {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         records::of_sampler(self, scene, &[])
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        let (longer, rest) = match self.count {
+            1 => (1.0, 1.0),
+            _ => (self.pmf_longer, self.pmf_rest),
+        };
+        Some(Packed {
+            scheme: Scheme::Uniform,
+            words: vec![
+                self.count,
+                self.units,
+                self.longer,
+                // Below 2^32 where there is a choice, and not used where there is none.
+                self.boundary as u32,
+                longer.to_bits(),
+                rest.to_bits(),
+            ],
+        })
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 /// Why an image could not be rendered, read or written.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RenderError {
     /// A setting out of its range.
@@ -36,4 +36,29 @@ pub enum RenderError {
         /// Why not.
         reason: String,
     },
+    /// No GPU, or no more.
+    #[error("{what}")]
+    Gpu {
+        /// The kind of it.
+        fault: GpuFault,
+        /// What is wrong and what to do.
+        what: String,
+    },
+}
+
+/// What can be wrong with a GPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum GpuFault {
+    /// There is none that can be used.
+    NoAdapter,
+    /// It stopped working, and why.
+    Lost(String),
+    /// Scene or image do not fit into it.
+    OutOfMemory,
+}
+
+impl GpuFault {
+    pub(crate) fn error(self, what: String) -> RenderError {
+        RenderError::Gpu { fault: self, what }
+    }
 }

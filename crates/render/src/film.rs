@@ -291,6 +291,19 @@ impl Film {
         Ok(())
     }
 
+    /// Takes the sums that somebody else has accumulated, by pixel, row 0 first: R, G, B, luminance squared, each times the weight of its
+    /// frame; number of samples; sum of their weights.
+    pub(crate) fn load(&mut self, of: impl Fn(usize) -> ([f64; 4], u32, f64)) {
+        let width = self.width;
+        for tile in &mut self.tiles {
+            let places = (0..tile.height).flat_map(|row| (0..tile.width).map(move |column| (row, column)));
+            for (pixel, (row, column)) in tile.pixels.iter_mut().zip(places) {
+                let (sums, count, weight) = of(((tile.y0 + row) * width + tile.x0 + column) as usize);
+                *pixel = PixelRecord { sums, count, weight };
+            }
+        }
+    }
+
     /// The mean image so far; black before the first frame.
     pub fn image(&self) -> Image {
         self.to_image(|tile, i| {

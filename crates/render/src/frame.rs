@@ -91,8 +91,13 @@ pub trait FrameLoop<'s>: Send {
     /// frame does not count, and nothing is learned. Returns whether the frame was finished.
     fn render_frame_unless(&mut self, stop: &AtomicBool) -> bool;
 
-    /// What has been accumulated.
+    /// What has been accumulated. What a device holds is read back when it is asked for.
     fn film(&self) -> &Film;
+
+    /// Why no more frames are made, if so: the device that made them is gone. Never for the CPU.
+    fn error(&self) -> Option<RenderError> {
+        None
+    }
 
     /// Starts the image anew. No random number is drawn again.
     fn restart(&mut self);
@@ -267,6 +272,21 @@ pub(crate) trait Frames: Send {
     /// learns nothing, and returns false.
     fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool);
 
+    /// What has been accumulated, if it is not all in `film`.
+    fn film<'f>(&'f self, film: &'f Film) -> &'f Film {
+        film
+    }
+
+    /// What was counted, if [`Frames::render`] has not told of it.
+    fn counters(&self, _film: &Film) -> Counters {
+        Counters::default()
+    }
+
+    /// See [`FrameLoop::error`].
+    fn error(&self) -> Option<RenderError> {
+        None
+    }
+
     /// Called when the scene has changed, before [`Frames::look`].
     fn scene_changed(&mut self, scene: &Scene);
 
@@ -299,21 +319,35 @@ pub(crate) trait Frames: Send {
 }
 
 /// Frames with one way of finding direct light.
-struct Drawn<D> {
-    direct: D,
+pub(crate) struct Drawn<D> {
+    pub(crate) direct: D,
     /// The frame with which the current sequence of random numbers began.
-    first_frame: u32,
+    pub(crate) first_frame: u32,
     /// What the last frame observed, one list per tile.
-    observations: Vec<Vec<Observation>>,
+    pub(crate) observations: Vec<Vec<Observation>>,
 }
 
 impl<D> Drawn<D> {
-    fn new(direct: D) -> Self {
+    pub(crate) fn new(direct: D) -> Self {
         Self {
             direct,
             first_frame: 0,
             observations: Vec::new(),
         }
+    }
+}
+
+impl<D: DirectLight> Drawn<D> {
+    /// Learns from what was observed in frame `frame`; returns whether something else is drawn from now on.
+    pub(crate) fn learn(&mut self, scene: &Scene, frame: u32) -> bool {
+        let before = self.direct.pace().lessons;
+        self.direct.end_frame(scene, &self.observations);
+        let learned = self.direct.pace().lessons != before;
+        if learned {
+            // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
+            self.first_frame = frame.wrapping_add(1);
+        }
+        learned
     }
 }
 
@@ -346,11 +380,7 @@ impl<D: DirectLight> Frames for Drawn<D> {
         if stop.load(Ordering::Relaxed) {
             return (counters, false);
         }
-        self.direct.end_frame(&eye.scene, &self.observations);
-        if self.direct.pace().lessons != pace.lessons {
-            // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
-            self.first_frame = eye.frame.wrapping_add(1);
-        }
+        self.learn(&eye.scene, eye.frame);
         (counters, true)
     }
 
@@ -407,7 +437,7 @@ impl<D: DirectLight> Frames for Drawn<D> {
 }
 
 /// A rendering with one way of making frames.
-struct Rendering<'s, F> {
+pub(crate) struct Rendering<'s, F> {
     eye: Eye<'s>,
     camera: Camera,
     aovs: bool,
@@ -420,7 +450,7 @@ struct Rendering<'s, F> {
 
 impl<'s, F: Frames> Rendering<'s, F> {
     /// `start` is when building the light structures began.
-    fn new(scene: SceneRef<'s>, camera: &Camera, settings: &Settings, frames: F, start: Instant) -> Self {
+    pub(crate) fn new(scene: SceneRef<'s>, camera: &Camera, settings: &Settings, frames: F, start: Instant) -> Self {
         let mut new = Self {
             eye: Eye {
                 area_lights: has_area_lights(&scene),
@@ -481,7 +511,11 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     }
 
     fn film(&self) -> &Film {
-        &self.film
+        self.frames.film(&self.film)
+    }
+
+    fn error(&self) -> Option<RenderError> {
+        self.frames.error()
     }
 
     fn restart(&mut self) {
@@ -567,14 +601,15 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
         );
         skip(self.eye.max_bounces == 0, "no bounces asked for: no indirect light");
         skip(!self.aovs, "no auxiliary images asked for: none kept");
+        let counters = self.counters + self.frames.counters(&self.film);
         RenderStats {
             frames: self.film.spp(),
             render_s: self.render_s,
             light_build_s: self.light_build_s,
             prepare_s: self.frames.prepare_s(),
-            rays_nearest: self.counters.rays_nearest,
-            rays_occluded: self.counters.rays_occluded,
-            nonfinite_samples: self.counters.nonfinite,
+            rays_nearest: counters.rays_nearest,
+            rays_occluded: counters.rays_occluded,
+            nonfinite_samples: counters.nonfinite,
             sampler,
             skipped,
         }

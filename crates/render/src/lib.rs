@@ -14,6 +14,7 @@ pub mod film;
 mod filter;
 pub mod flip;
 pub mod frame;
+pub mod gpu;
 pub mod image;
 pub mod metric;
 mod oracle;
@@ -23,7 +24,7 @@ mod resampling;
 pub mod settings;
 
 pub use choosing::Choosing;
-pub use error::RenderError;
+pub use error::{GpuFault, RenderError};
 pub use film::{Film, Image};
 pub use flip::flip;
 pub use frame::{FrameLoop, RenderStats, SceneRef, renderer};

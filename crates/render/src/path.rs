@@ -48,11 +48,7 @@ pub(crate) struct FrameView<'f, D> {
 impl<D> FrameView<'_, D> {
     /// The same frame with random numbers of the sequence that began with frame `first`, which are independent of those of all others.
     pub(crate) fn in_sequence_since(mut self, first: u32) -> Self {
-        if first > 0 {
-            let [high, low] = [1, 2].map(|i| u64::from(hash2(first, i)));
-            self.seed ^= high << 32 | low;
-            self.frame = self.frame.wrapping_sub(first);
-        }
+        (self.seed, self.frame) = sequence_since(self.seed, self.frame, first);
         self
     }
 
@@ -63,6 +59,15 @@ impl<D> FrameView<'_, D> {
         let first = self.frame.wrapping_mul(self.light_samples);
         (0..self.light_samples).map(move |k| first.wrapping_add(k))
     }
+}
+
+/// Seed, and number in the sequence, of frame number `frame` in the sequence that began with frame `first`.
+pub(crate) fn sequence_since(seed: u64, frame: u32, first: u32) -> (u64, u32) {
+    if first == 0 {
+        return (seed, frame);
+    }
+    let [high, low] = [1, 2].map(|i| u64::from(hash2(first, i)));
+    (seed ^ (high << 32 | low), frame.wrapping_sub(first))
 }
 
 /// What is counted.

@@ -211,6 +211,18 @@ impl Discrete {
         self.floor as f64 / TOTAL as f64
     }
 
+    /// Appends it to `words`, for back ends that draw elsewhere; returns where. Five words: entries, last entry of mass above 0, bits by
+    /// which a number is shifted to its guide cell, where the first values of the entries begin, where the guide begins.
+    pub fn pack(&self, words: &mut Vec<u32>) -> u32 {
+        let at = words.len() as u32;
+        let starts = at + 5;
+        let guide = starts + self.start.len() as u32;
+        words.extend([self.start.len() as u32, self.last, self.guide_shift, starts, guide]);
+        words.extend(&self.start);
+        words.extend(&self.guide);
+        at
+    }
+
     /// Number of entries; never 0.
     #[allow(clippy::len_without_is_empty, reason = "an empty distribution cannot be made")]
     pub fn len(&self) -> usize {

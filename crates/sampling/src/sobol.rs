@@ -78,6 +78,12 @@ const fn table() -> [[[u32; 8]; 16]; 8] {
     rows
 }
 
+/// The table that the matrix product is taken from, for back ends that take it elsewhere: by position (0 to 7), nibble (0 to 15) and
+/// dimension (0 to 7), the bit-reversed point of the nibble at that position of the bit-reversed index.
+pub fn reversed_rows() -> &'static [[[u32; 8]; 16]; 8] {
+    &TABLE.rows
+}
+
 /// The point of `index` in `dimension`, unscrambled: 32 bits after the binary point. Dimensions are taken modulo 8.
 #[inline]
 pub fn sobol(index: u32, dimension: u32) -> u32 {

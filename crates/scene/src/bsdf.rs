@@ -1,6 +1,6 @@
 //! The BSDF: a Lambert lobe under a GGX lobe.
 
-mod albedo;
+pub(crate) mod albedo;
 
 use albedo::SpecularAlbedo;
 use glam::{Vec2, Vec3};

@@ -18,9 +18,12 @@ pub struct Camera {
 pub struct CameraRays {
     /// World-space position of the pinhole.
     pub origin_ws: Vec3,
-    corner_ws: Vec3,
-    step_x_ws: Vec3,
-    step_y_ws: Vec3,
+    /// From the pinhole to the image's top left corner, one metre in front of it.
+    pub corner_ws: Vec3,
+    /// From a pixel to its right neighbour, there.
+    pub step_x_ws: Vec3,
+    /// From a pixel to the one below.
+    pub step_y_ws: Vec3,
 }
 
 impl Camera {

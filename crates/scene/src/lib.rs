@@ -21,6 +21,7 @@ pub mod instance;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod packed;
 mod recentre;
 mod relight;
 pub mod report;

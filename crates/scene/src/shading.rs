@@ -31,6 +31,11 @@ impl TriangleRecord {
     const DETAILED: u32 = 1 << 30;
     const FLAGS: u32 = Self::SMOOTH | Self::DETAILED;
 
+    /// Material and flags as they are stored: bit 31 smooth, bit 30 detailed.
+    pub(crate) fn material_word(&self) -> u32 {
+        self.material
+    }
+
     #[inline]
     pub(crate) fn material(&self) -> u32 {
         self.material & !Self::FLAGS

@@ -59,6 +59,11 @@ static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
     })
 });
 
+/// Linear value of each sRGB code, as bits.
+pub(crate) fn linear_from_srgb() -> impl Iterator<Item = u32> {
+    LINEAR_FROM_SRGB.iter().map(|value| value.to_bits())
+}
+
 impl Texture {
     /// Linear RGBA at `uv` (v runs downwards, as in glTF), filtered and wrapped. Coordinates that are not finite count as
     /// zero.

@@ -26,7 +26,7 @@ Examples:
   manylight bench demo:rooms --samplers power,table   how fast does the error fall?
 
 Exit codes: 0 done, 1 a comparison or check failed, 2 bad usage or input, 3 no suitable GPU,
-4 out of memory, 130 interrupted (what is there is written first)."
+4 out of memory or GPU lost, 130 interrupted (what is there is written first)."
 )]
 pub(crate) struct Cli {
     /// What to do.
@@ -87,7 +87,7 @@ pub(crate) struct LightArgs {
     /// Threads that render; default: RAYON_NUM_THREADS, or all processors
     #[arg(long, value_name = "N", alias = "nthreads", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// What renders: this release has the CPU only
+    /// What renders; the GPU has the samplers uniform, power, table, tree and adaptive
     #[arg(long, value_enum, default_value_t = Backend::Cpu)]
     pub(crate) backend: Backend,
     /// Camera of the scene, by name or by index
@@ -160,16 +160,21 @@ impl SizeArgs {
 }
 
 impl LightArgs {
-    /// The settings of rendering that these options stand for.
+    /// The settings of rendering that these options stand for, in a command that renders on the CPU only.
     ///
     /// # Errors
     /// If a GPU is asked for.
-    pub(crate) fn settings(&self, method: Method, (width, height): (u32, u32)) -> Result<render::Settings> {
+    pub(crate) fn settings(&self, method: Method, size: (u32, u32)) -> Result<render::Settings> {
         if self.backend == Backend::Gpu {
-            let text = "this release renders on the CPU only: there is no GPU back end; leave --backend away";
+            let text = "this command renders on the CPU only (`render` and `dump` know the GPU); leave --backend away";
             return Err(Refusal::NoGpu(text.into()).into());
         }
-        Ok(render::Settings {
+        Ok(self.settings_anywhere(method, size))
+    }
+
+    /// The settings of rendering that these options stand for, whatever renders.
+    pub(crate) fn settings_anywhere(&self, method: Method, (width, height): (u32, u32)) -> render::Settings {
+        render::Settings {
             width,
             height,
             method,
@@ -188,17 +193,16 @@ impl LightArgs {
                 ..Default::default()
             },
             ..Default::default()
-        })
+        }
     }
 }
 
 /// What renders.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Backend {
-    /// Processor.
+    /// the processor
     Cpu,
-    /// Not in this release.
-    #[value(hide = true)]
+    /// the graphics card, or any adapter that wgpu finds
     Gpu,
 }
 

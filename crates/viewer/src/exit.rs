@@ -26,7 +26,7 @@ impl From<Status> for ExitCode {
 pub(crate) enum Refusal {
     /// There is no GPU to be used.
     NoGpu(String),
-    /// The job does not fit into memory.
+    /// The job does not fit into memory, or the GPU is lost.
     OutOfMemory(String),
 }
 

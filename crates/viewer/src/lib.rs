@@ -31,7 +31,7 @@ use std::process::ExitCode;
 
 /// Runs the program with the arguments of the process; returns what the process should end with.
 ///
-/// Exit codes: 0 done, 1 a comparison failed, 2 bad usage or input, 3 no suitable GPU, 4 out of memory, 130 interrupted.
+/// Exit codes: 0 done, 1 a comparison failed, 2 bad usage or input, 3 no suitable GPU, 4 out of memory or GPU lost, 130 interrupted.
 pub fn run() -> ExitCode {
     let cli = match Cli::try_parse().or_else(view_scene) {
         Ok(cli) => cli,

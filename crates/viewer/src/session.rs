@@ -1,12 +1,13 @@
 //! From arguments to frames: loading, choosing the camera, rendering until the budget is spent.
 
-use crate::cli::BudgetArgs;
+use crate::cli::{Backend, BudgetArgs};
 use crate::exit::Refusal;
 use crate::interrupt::Watch;
 use crate::progress::Progress;
 use crate::{machine, message};
 use anyhow::{Context, Result, bail};
-use render::{FrameLoop, SceneRef, Settings};
+use render::gpu::Gpu;
+use render::{FrameLoop, GpuFault, RenderError, SceneRef, Settings};
 use scene::{Camera, Scene};
 use std::path::Path;
 use std::time::Instant;
@@ -133,6 +134,35 @@ pub(crate) fn start<'s>(
     Ok(render::renderer(scene, camera, settings)?)
 }
 
+/// [`start`] on the CPU or on the GPU.
+///
+/// # Errors
+/// Those of [`start`]; [`Refusal::NoGpu`]; what the GPU lacks.
+pub(crate) fn start_on<'s>(
+    backend: Backend,
+    scene: impl Into<SceneRef<'s>>,
+    camera: &Camera,
+    settings: &Settings,
+) -> Result<(Box<dyn FrameLoop<'s> + 's>, String)> {
+    if backend == Backend::Cpu {
+        return Ok((start(scene, camera, settings)?, "cpu".into()));
+    }
+    let gpu = Gpu::open().map_err(of_gpu)?;
+    let frames = render::gpu::renderer(&gpu, scene, camera, settings).map_err(of_gpu)?;
+    Ok((frames, format!("gpu: {}", gpu.info())))
+}
+
+/// Gives faults of the GPU their exit codes.
+fn of_gpu(error: RenderError) -> anyhow::Error {
+    match error {
+        RenderError::Gpu { fault, what } => match fault {
+            GpuFault::NoAdapter => Refusal::NoGpu(what).into(),
+            GpuFault::Lost(_) | GpuFault::OutOfMemory => Refusal::OutOfMemory(what).into(),
+        },
+        other => other.into(),
+    }
+}
+
 /// When to stop.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Budget {
@@ -175,13 +205,16 @@ impl Budget {
 
 /// Renders until the budget is spent or a signal comes; at least one frame. `each` sees the state after every frame,
 /// its time does not count. Returns the seconds spent in frames.
+///
+/// # Errors
+/// If the GPU that renders is lost.
 pub(crate) fn render_frames(
     frame_loop: &mut dyn FrameLoop<'_>,
     budget: Budget,
     watch: &Watch,
     what: &str,
     mut each: impl FnMut(&dyn FrameLoop<'_>),
-) -> f64 {
+) -> Result<f64> {
     let pixels = u64::from(frame_loop.film().width()) * u64::from(frame_loop.film().height());
     let mut progress = Progress::new(what);
     let (mut frames, mut seconds) = (0, 0.0);
@@ -189,6 +222,9 @@ pub(crate) fn render_frames(
     loop {
         let start = Instant::now();
         frame_loop.render_frame();
+        if let Some(error) = frame_loop.error() {
+            return Err(of_gpu(error));
+        }
         seconds += start.elapsed().as_secs_f64();
         frames += 1;
         let mut done = budget.done(frames, seconds);
@@ -204,7 +240,7 @@ pub(crate) fn render_frames(
         progress.update(done, frames, pixels);
         each(frame_loop);
         if done >= 1.0 || watch.stopped() {
-            return seconds;
+            return Ok(seconds);
         }
     }
 }

@@ -15,6 +15,11 @@ impl Branch {
     /// The whole tree.
     pub(super) const ROOT: Self = Self(0);
 
+    /// As it is stored: the highest bit says that the others are one light's place; all ones are the lights at infinity.
+    pub(super) fn bits(self) -> u32 {
+        self.0
+    }
+
     /// The branch that tree node `node` is.
     pub(super) fn of_node(tree: &Tree, node: u32) -> Self {
         let n = &tree.nodes[node as usize];

@@ -9,7 +9,7 @@ use super::branch::Branch;
 use super::emitter::Emitter;
 use super::palette::Palette;
 use super::subcells::{Count, Cube, SubCells};
-use super::weights::{Factors, Part, View, Wanted, Weighed, Weights};
+use super::weights::{Factors, Lanes, Part, View, Wanted, Weighed, Weights};
 use crate::Observation;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 use glam::Vec3;
@@ -279,6 +279,21 @@ impl Cell {
             self.build(lights);
         }
         self.subcells.refresh(&self.counts(), false);
+    }
+
+    /// The learned weights.
+    pub(super) fn weights(&self) -> &Weights {
+        &self.weights
+    }
+
+    /// First light of each entry, in tree order.
+    pub(super) fn firsts(&self) -> &[u32] {
+        &self.firsts
+    }
+
+    /// See [`SubCells::factors_by_cube`].
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, &[Lanes])> {
+        self.subcells.factors_by_cube()
     }
 
     /// How many of its cubes anything was seen in.

@@ -38,6 +38,16 @@ impl Cells {
         self.unit
     }
 
+    /// What finds the cells.
+    pub(super) fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The cells, by number.
+    pub(super) fn all(&self) -> &[Cell] {
+        &self.cells
+    }
+
     /// Number of cells.
     pub(super) fn len(&self) -> usize {
         self.cells.len()

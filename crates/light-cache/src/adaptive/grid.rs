@@ -6,6 +6,7 @@
 
 use super::subcells::{self, Cube};
 use crate::ShadingPoint;
+use crate::packed::align;
 use glam::Vec3;
 use sampling::hash::mix;
 
@@ -102,6 +103,20 @@ impl Grid {
             at = (at + 1) & (self.slots.len() - 1);
         }
         at
+    }
+
+    /// Appends the slots, four words each: key, cell. Returns ten words: where they are, the binary logarithm of their number, the eye,
+    /// the centre, the edge of the smallest cube and its inverse.
+    pub(super) fn pack(&self, words: &mut Vec<u32>) -> [u32; 10] {
+        let slots = align(words);
+        for &(key, cell) in &self.slots {
+            words.extend([key as u32, (key >> 32) as u32, cell, 0]);
+        }
+        let [ex, ey, ez] = self.eye_ws.to_array().map(f32::to_bits);
+        let [cx, cy, cz] = self.center_ws.to_array().map(f32::to_bits);
+        let sizes = [self.min_size, self.inverse_min_size].map(f32::to_bits);
+        let bits = self.slots.len().trailing_zeros();
+        [slots, bits, ex, ey, ez, cx, cy, cz, sizes[0], sizes[1]]
     }
 
     /// Adds a key that is not there yet.

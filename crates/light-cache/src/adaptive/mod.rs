@@ -20,6 +20,7 @@ mod cell;
 mod cells;
 mod emitter;
 mod grid;
+mod packed;
 mod palette;
 mod subcells;
 mod weights;
@@ -27,7 +28,7 @@ mod weights;
 use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
-    CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint,
+    CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Settings, ShadingPoint,
     TableSampler, TreeVisibleSampler, records, state,
 };
 use cell::{Lights, Nearby};
@@ -266,6 +267,10 @@ impl LightSampler for AdaptiveSampler {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         records::of_sampler(self, scene, &[])
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        self.packed()
     }
 
     fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {

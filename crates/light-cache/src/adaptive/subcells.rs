@@ -170,6 +170,17 @@ impl SubCells {
         Factors::default()
     }
 
+    /// All factors, each with the number of its cube in its layer; bit 12 is set for the smallest cubes.
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, &[Lanes])> {
+        self.layers.iter().zip([0, 1 << 12]).flat_map(|(layer, bit)| {
+            let numbered = (0..).zip(&layer.numbers);
+            numbered.filter_map(move |(cube, &number)| {
+                let factors = &layer.subcells.get(usize::from(number))?.drawn;
+                (!factors.is_empty()).then_some((bit | cube, &factors[..]))
+            })
+        })
+    }
+
     /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing, if they `may_grow` in number.
     pub(super) fn observe(&mut self, cube: Cube, entry: usize, draws: Count, entries: usize, may_grow: bool) {
         let mut around = NONE;

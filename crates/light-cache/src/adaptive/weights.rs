@@ -188,6 +188,25 @@ impl Weights {
         weights
     }
 
+    /// The first `count` entries, in tree order.
+    pub(super) fn entries(&self, count: usize) -> impl Iterator<Item = (Branch, Emitter)> {
+        (0..count).map(|entry| {
+            let (row, lane) = (entry % self.rows.len(), entry / self.rows.len());
+            let mut emitter = self.rows[row].emitter(lane);
+            if let Some(attenuation) = self.attenuation.get(row) {
+                emitter.cone_scale = attenuation.cone_scale[lane];
+                emitter.cone_offset = attenuation.cone_offset[lane];
+                emitter.inverse_range_sq = attenuation.inverse_range_sq[lane];
+            }
+            (self.rows[row].branch[lane], emitter)
+        })
+    }
+
+    /// Whether any entry is attenuated.
+    pub(super) fn is_attenuated(&self) -> bool {
+        !self.attenuation.is_empty()
+    }
+
     /// Bytes held.
     pub(super) fn bytes(&self) -> usize {
         self.rows.capacity() * size_of::<Row>()

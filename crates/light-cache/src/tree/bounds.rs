@@ -231,6 +231,11 @@ impl LeafLight {
         self.tag & ((1 << Self::INDEX_BITS) - 1)
     }
 
+    /// Index and [`Emission`] as they are stored.
+    pub(crate) fn tag(&self) -> u32 {
+        self.tag
+    }
+
     /// A point light's strength at `distance`, `cos_axis` off its axis, relative to that on the axis without an end (`KHR_lights_punctual`).
     /// Zero only where the light has ended; a little more than exact next to there.
     #[inline]

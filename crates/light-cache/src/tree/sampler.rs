@@ -1,8 +1,8 @@
 //! The plain light tree as a sampler: no learning, no visibility.
 
 use super::{Descent, Tree, UNIT, position, probability};
-use crate::records;
-use crate::{Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use crate::{Choice, LightRecord, LightSampler, Observation, Packed, SamplerStats, Scheme, ShadingPoint};
+use crate::{packed, records};
 use scene::{Light, Scene};
 use std::time::Instant;
 
@@ -79,6 +79,15 @@ impl LightSampler for TreeSampler {
 
     fn records(&self, scene: &Scene) -> Vec<LightRecord> {
         records::of_sampler(self, scene, &[])
+    }
+
+    fn pack(&self) -> Option<Packed> {
+        let mut words = vec![0; packed::TREE_HEADER];
+        packed::pack_tree(&self.tree, 0, &mut words);
+        Some(Packed {
+            scheme: Scheme::Tree,
+            words,
+        })
     }
 }
 

@@ -73,6 +73,12 @@ fn place(cosine: f32) -> (usize, f32) {
     (column, place - column as f32)
 }
 
+/// The table as words: albedos by row and column, then the means by row, two numbers each.
+pub(crate) fn words() -> impl Iterator<Item = u32> {
+    let entries = TABLE.albedo.iter().flatten().chain(&TABLE.mean);
+    entries.flat_map(|entry| entry.to_array().map(f32::to_bits))
+}
+
 impl Table {
     fn new() -> Self {
         let mut table = Self {

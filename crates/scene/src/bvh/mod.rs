@@ -9,6 +9,7 @@ mod alpha;
 mod bounds;
 mod bvh2;
 mod collapse;
+mod flat;
 mod kernel;
 mod node;
 mod pack;
@@ -18,6 +19,7 @@ mod traverse;
 
 use crate::{Mesh, SceneParts};
 use bounds::Bounds;
+pub use flat::FlatBvh;
 use glam::Vec3;
 pub use kernel::Kernel;
 #[cfg(target_arch = "x86_64")]

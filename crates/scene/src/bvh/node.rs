@@ -6,6 +6,7 @@
 //! gives (near, far) planes for a ray going up or down that axis, and never crosses a cache line. Two lines in all.
 
 use super::bounds::Bounds;
+use bytemuck::{Pod, Zeroable};
 
 /// Set in a child reference that names a leaf.
 pub(super) const LEAF: u32 = 1 << 31;
@@ -20,7 +21,7 @@ const STEPS: f64 = 252.0;
 const SLACK_STEPS: f64 = 1.0 / 64.0;
 
 /// Eight quantised boxes and what they contain.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(128))]
 pub(super) struct Node {
     /// The boxes' planes across each axis.
@@ -30,7 +31,7 @@ pub(super) struct Node {
 }
 
 /// The planes of eight boxes across one axis.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Slabs {
     /// Eight lower planes, eight upper planes, the eight lower planes again, in steps from `origin`.

@@ -2,6 +2,7 @@
 
 use super::node::WIDTH;
 use crate::{Material, Mesh};
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 /// In a triangle's tag: its back cannot be hit.
@@ -12,7 +13,7 @@ pub(super) const MASKED: u32 = 1 << 30;
 pub(super) const INDEX: u32 = MASKED - 1;
 
 /// Up to eight triangles: five cache lines. Unused lanes hold points, which are never hit.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub(super) struct Pack {
     /// By corner, axis, lane. Corners and not edges, so that triangles that share corners compute with equal numbers.

@@ -36,9 +36,14 @@ pub(crate) struct InfoArgs {
 }
 
 /// Environment variables that matter, with what they do.
-const ENVIRONMENT: [(&str, &str); 3] = [
+const ENVIRONMENT: [(&str, &str); 5] = [
     ("RAYON_NUM_THREADS", "threads, where --threads is not given"),
     ("NO_COLOR", "no colours in help and errors"),
+    (
+        "WGPU_BACKEND",
+        "interfaces in which --backend gpu looks: vulkan, metal, dx12 or gl",
+    ),
+    ("WGPU_ADAPTER_NAME", "part of the name of the adapter that it takes"),
     ("XDG_CACHE_HOME", "folder in which bench keeps its references"),
 ];
 
@@ -102,6 +107,21 @@ fn program_text() -> String {
             .map(|m| (m.name().into(), describe(m).into()))
             .collect(),
     );
+    let adapters = render::gpu::adapters();
+    let of_none = || {
+        vec![(
+            "none".to_owned(),
+            "--backend gpu needs a driver for Vulkan, Metal or Direct3D 12".to_owned(),
+        )]
+    };
+    let listed: Vec<_> = adapters
+        .iter()
+        .map(|a| (a.name.clone(), format!("{}, {}, {}", a.kind, a.backend, a.driver)))
+        .collect();
+    section(
+        "\nAdapters for --backend gpu:\n",
+        if listed.is_empty() { of_none() } else { listed },
+    );
     let variables = ENVIRONMENT.map(|(name, what)| {
         let value = std::env::var(name).map_or("not set".into(), |value| format!("= {value}"));
         (name.to_string(), format!("{what} ({value})"))
@@ -117,6 +137,7 @@ fn program_json() -> Result<String> {
     let variables = ENVIRONMENT.map(|(name, _)| (name.to_string(), json!(std::env::var(name).ok())));
     let json = json!({
         "machine": Machine::detect(),
+        "adapters": render::gpu::adapters(),
         "demos": pairs(generate::families().map(|(name, what)| (name.into(), what.into())).collect()),
         "samplers": pairs(Method::all_and_research().map(|m| (m.name().into(), describe(m).into())).collect()),
         "environment": serde_json::Map::from_iter(variables),

@@ -167,7 +167,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if let Some(path) = &args.resume {
         output::check_writable(path)?;
     }
-    let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)))?;
+    let mut settings = args.light.settings_anywhere(args.sampler, args.size.or((1280, 720)));
     settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
     settings.check()?;
     if settings.light.ignore_below > 0.0 {
@@ -181,7 +181,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     }
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
-    let mut frames = session::start(&loaded.scene, camera, &settings)?;
+    let (mut frames, backend) = session::start_on(args.light.backend, &loaded.scene, camera, &settings)?;
     let title = format!("manylight {}", loaded.scene.parts.name);
     let mut display = args
         .display_server
@@ -221,7 +221,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
                 }
                 saved = Instant::now();
             }
-        });
+        })?;
     }
 
     let interrupted = watch.writing();
@@ -232,7 +232,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let run = frames.stats();
     // Measuring takes about as long as a frame: only where somebody will read the result.
     let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
-    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted);
+    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted, backend);
     match format {
         Format::Part => parts::write(&args.output, &header, frames.as_ref())?,
         _ => {

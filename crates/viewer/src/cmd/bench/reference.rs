@@ -122,7 +122,7 @@ impl Reference {
                 "reference of {}, half {half} of 2, kept for next time",
                 scene.parts.name
             );
-            session::render_frames(frames.as_mut(), budget, watch, &what, |_| {});
+            session::render_frames(frames.as_mut(), budget, watch, &what, |_| {})?;
             if watch.stopped() {
                 return Ok(None);
             }

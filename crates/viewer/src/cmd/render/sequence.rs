@@ -101,7 +101,7 @@ pub(super) fn run(
     let Some((first, _)) = sequence.frames.first() else {
         return Ok(Status::Done);
     };
-    let mut renderer = session::start(&loaded.scene, first, settings)?;
+    let (mut renderer, backend) = session::start_on(args.light.backend, &loaded.scene, first, settings)?;
     let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
     // By the first frame, if none is asked for: a film whose exposure jumps from picture to picture flickers.
     let mut exposure = args.exposure;
@@ -110,11 +110,19 @@ pub(super) fn run(
         let watch = Watch::rendering();
         renderer.set_camera(camera);
         let what = format!("frame {number} of {count}");
-        session::render_frames(renderer.as_mut(), budget, &watch, &what, |_| {});
+        session::render_frames(renderer.as_mut(), budget, &watch, &what, |_| {})?;
         let interrupted = watch.writing();
         let film = renderer.film();
         let exposure = *exposure.get_or_insert_with(|| image::auto_exposure(&film.image()));
-        let stats = Stats::new(loaded, &camera.name, settings, &renderer.stats(), None, interrupted);
+        let stats = Stats::new(
+            loaded,
+            &camera.name,
+            settings,
+            &renderer.stats(),
+            None,
+            interrupted,
+            backend.clone(),
+        );
         let made = Made {
             film,
             scene: &loaded.scene,

@@ -14,7 +14,8 @@ pub(super) struct Stats {
     /// Name of the camera.
     pub(super) camera: String,
     version: &'static str,
-    backend: &'static str,
+    /// "cpu", or "gpu: " and the adapter.
+    backend: String,
     /// Name of the sampler.
     pub(super) sampler: &'static str,
     width: u32,
@@ -68,6 +69,7 @@ impl Stats {
         run: &RenderStats,
         choosing: Option<Choosing>,
         interrupted: bool,
+        backend: String,
     ) -> Self {
         let threads = rayon::current_num_threads();
         let frame_s = run.render_s / run.frames.max(1) as f64;
@@ -79,7 +81,7 @@ impl Stats {
             scene: loaded.what.clone(),
             camera: camera.into(),
             version: machine::VERSION,
-            backend: "cpu",
+            backend,
             sampler: settings.method.name(),
             width: settings.width,
             height: settings.height,

@@ -1,0 +1,116 @@
+//! The learned cuts as words: what `shaders/light_cache/adaptive.wgsl` draws from.
+
+use super::AdaptiveSampler;
+use super::cell::Cell;
+use crate::packed::{self, Packed, Scheme, align};
+use crate::{LightSampler, TableSampler};
+
+/// Words of the header; the tree's are the first.
+const HEADER: usize = 24;
+/// Where in the header the global table begins, the grid, and the cells.
+const TABLE: usize = packed::TREE_HEADER;
+const GRID: usize = TABLE + 3;
+const CELLS: usize = GRID + 10;
+
+/// No such thing.
+const NONE: u32 = u32::MAX;
+
+/// The factors of one cube: key, and where they are.
+type CubeSlot = [u32; 2];
+
+impl AdaptiveSampler {
+    /// See [`LightSampler::pack`].
+    pub(super) fn packed(&self) -> Option<Packed> {
+        let mut words = vec![0; HEADER];
+        packed::pack_tree(self.tree(), 0, &mut words);
+        let [primary, secondary] = self.table.pack_distributions(&mut words)?;
+        words[TABLE..TABLE + 3].copy_from_slice(&[primary, secondary, self.table_mass]);
+        let grid = self.cells.grid().pack(&mut words);
+        words[GRID..GRID + 10].copy_from_slice(&grid);
+        let mut cubes = Vec::new();
+        let records: Vec<[u32; 8]> = (0..)
+            .zip(self.cells.all())
+            .map(|(number, cell)| pack_cell(number, cell, &mut words, &mut cubes))
+            .collect();
+        let cells = align(&mut words);
+        words.extend(records.iter().flatten());
+        let (table, bits) = pack_cubes(&cubes, &mut words);
+        words[CELLS..HEADER].copy_from_slice(&[cells, table, bits]);
+        // Positions of words are 32-bit numbers.
+        u32::try_from(words.len()).ok()?;
+        Some(Packed {
+            scheme: Scheme::Adaptive,
+            words,
+        })
+    }
+}
+
+/// Appends the cut of a cell and its factors; returns its record.
+fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<CubeSlot>) -> [u32; 8] {
+    let count = cell.entries.len();
+    let entries = align(words);
+    for (branch, e) in cell.weights().entries(count) {
+        let ball = [e.center.extend(e.radius), e.axis.extend(e.depth)];
+        words.extend(ball.iter().flat_map(|v| v.to_array()).map(f32::to_bits));
+        let shape = [
+            e.quarter_inverse_radius,
+            e.quarter_inverse_depth,
+            e.one_sided,
+            e.isotropic,
+        ];
+        words.extend(shape.map(f32::to_bits));
+        words.extend([e.weight.to_bits(), e.everywhere.to_bits(), branch.bits(), 0]);
+    }
+    let mut attenuations = NONE;
+    if cell.weights().is_attenuated() {
+        attenuations = words.len() as u32;
+        for (_, e) in cell.weights().entries(count) {
+            words.extend([e.cone_scale, e.cone_offset, e.inverse_range_sq, 0.0].map(f32::to_bits));
+        }
+    }
+    let firsts = words.len() as u32;
+    words.extend(cell.firsts());
+    for (cube, factors) in cell.factors_by_cube() {
+        cubes.push([number << 13 | cube, words.len() as u32]);
+        let rows = factors.len();
+        let in_order = (0..count).map(|entry| factors[entry % rows][entry / rows]);
+        words.extend(in_order.map(f32::to_bits));
+    }
+    [count as u32, entries, attenuations, firsts, 0, 0, 0, 0]
+}
+
+/// Appends a hash table, at most half full; returns where it is and the binary logarithm of its size.
+fn pack_cubes(cubes: &[CubeSlot], words: &mut Vec<u32>) -> (u32, u32) {
+    let size = (2 * cubes.len()).next_power_of_two().max(16);
+    let bits = size.trailing_zeros();
+    let mut slots = vec![[NONE, 0]; size];
+    for cube in cubes {
+        let mut at = (cube[0].wrapping_mul(0x9e37_79b9) >> (32 - bits)) as usize;
+        while slots[at][0] != NONE {
+            at = (at + 1) & (size - 1);
+        }
+        slots[at] = *cube;
+    }
+    let table = words.len() as u32;
+    words.extend(slots.iter().flatten());
+    (table, bits)
+}
+
+impl TableSampler {
+    /// Appends the distributions for first and for later hits; returns where they are.
+    pub(crate) fn pack_distributions(&self, words: &mut Vec<u32>) -> Option<[u32; 2]> {
+        let packed = self.pack()?.words;
+        // Their positions are counted from where the table begins.
+        let start = words.len() as u32;
+        words.extend(&packed);
+        let at = [packed[0], packed[1]].map(|at| at + start);
+        let mut moved = at.to_vec();
+        moved.dedup();
+        for at in moved {
+            for position in [at + 3, at + 4] {
+                words[position as usize] += start;
+            }
+        }
+        Some(at)
+    }
+}

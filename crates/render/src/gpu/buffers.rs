@@ -1,0 +1,79 @@
+//! Making buffers and reading them back.
+
+use super::device::Gpu;
+use crate::RenderError;
+use wgpu::BufferUsages;
+use wgpu::util::DeviceExt;
+
+/// Least size of a buffer: bindings of nothing are not allowed.
+const LEAST: u64 = 256;
+
+/// A read-only storage buffer that holds `bytes`.
+///
+/// # Errors
+/// [`RenderError::Gpu`] if it is larger than the device takes.
+pub(super) fn storage(gpu: &Gpu, label: &str, bytes: &[u8]) -> Result<wgpu::Buffer, RenderError> {
+    if let Some(error) = gpu.refuses(label, bytes.len() as u64) {
+        return Err(error);
+    }
+    let padding;
+    let contents = if bytes.len() < LEAST as usize {
+        let mut padded = bytes.to_vec();
+        padded.resize(LEAST as usize, 0);
+        padding = padded;
+        &padding
+    } else {
+        bytes
+    };
+    Ok(gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents,
+        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
+    }))
+}
+
+/// A uniform buffer that holds `bytes`.
+pub(super) fn uniform(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
+    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        label: Some(label),
+        contents: bytes,
+        usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+    })
+}
+
+/// A storage buffer of zeros that the device writes.
+///
+/// # Errors
+/// As [`storage`].
+pub(super) fn written(gpu: &Gpu, label: &str, size: u64) -> Result<wgpu::Buffer, RenderError> {
+    if let Some(error) = gpu.refuses(label, size) {
+        return Err(error);
+    }
+    Ok(gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some(label),
+        size: size.max(LEAST),
+        usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    }))
+}
+
+/// Copies a buffer to the CPU and hands its bytes to `look`; `None` if the device is lost.
+pub(super) fn read<T>(gpu: &Gpu, buffer: &wgpu::Buffer, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
+    let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read back"),
+        size: buffer.size(),
+        usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu
+        .device
+        .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+    gpu.queue.submit([encoder.finish()]);
+    copy.map_async(wgpu::MapMode::Read, .., |_| {});
+    if !gpu.wait() {
+        return None;
+    }
+    let bytes = copy.get_mapped_range(..).ok()?;
+    Some(look(&bytes))
+}

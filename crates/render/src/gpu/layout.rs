@@ -1,0 +1,93 @@
+//! Records that frames share with `shaders/record`.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use light_cache::{Observation, ShadingPoint};
+
+/// What changes from frame to frame: `FrameParams` in `shaders/record/frame.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader, and in the settings of the same names")]
+pub struct FrameParams {
+    pub origin_ws: [f32; 3],
+    pub width: u32,
+    pub corner_ws: [f32; 3],
+    pub height: u32,
+    pub step_x_ws: [f32; 3],
+    pub frame: u32,
+    pub step_y_ws: [f32; 3],
+    pub weight: f32,
+    pub seed: [u32; 2],
+    pub max_bounces: u32,
+    pub light_samples: u32,
+    pub clear: u32,
+    pub candidates: u32,
+    pub slots: u32,
+    pub first_row: u32,
+}
+
+/// Sums of one pixel: `FilmPixel` in `shaders/record/film.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader")]
+pub struct FilmPixel {
+    pub hi: [f32; 4],
+    pub lo: [f32; 4],
+    pub weight_hi: f32,
+    pub weight_lo: f32,
+    pub count: u32,
+    pub nonfinite: u32,
+    pub rays_nearest: u32,
+    pub rays_occluded: u32,
+    pub light: u32,
+    pub pad: u32,
+}
+
+impl FilmPixel {
+    /// R, G, B and luminance squared.
+    pub(crate) fn sums(&self) -> [f64; 4] {
+        std::array::from_fn(|channel| f64::from(self.hi[channel]) + f64::from(self.lo[channel]))
+    }
+
+    /// Sum of the weights.
+    pub(crate) fn weight(&self) -> f64 {
+        f64::from(self.weight_hi) + f64::from(self.weight_lo)
+    }
+}
+
+/// What a vertex found out about a light: `Observation` in `shaders/record/film.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader, and in `light_cache::Observation`")]
+pub struct PackedObservation {
+    pub position_ws: [f32; 3],
+    pub light: u32,
+    pub normal_ws: [f32; 3],
+    pub flags: u32,
+    pub unshadowed: f32,
+    pub irradiance: f32,
+    pub pmf: f32,
+    pub pad: u32,
+}
+
+impl PackedObservation {
+    const PRIMARY: u32 = 1;
+    const VISIBLE: u32 = 2;
+
+    /// `None` for a slot that was not used.
+    pub(crate) fn get(&self) -> Option<Observation> {
+        (self.light != u32::MAX).then(|| Observation {
+            point: ShadingPoint {
+                position_ws: Vec3::from(self.position_ws),
+                normal_ws: Vec3::from(self.normal_ws),
+                primary: self.flags & Self::PRIMARY != 0,
+            },
+            light: self.light,
+            unshadowed: self.unshadowed,
+            irradiance: self.irradiance,
+            pmf: self.pmf,
+            visible: self.flags & Self::VISIBLE != 0,
+            weight: 1,
+        })
+    }
+}

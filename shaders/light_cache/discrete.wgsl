@@ -1,0 +1,19 @@
+// One distribution over all lights for first hits, one for later ones: `power` and `table`. Header: where both are.
+#import "light_cache/distribution.wgsl"
+
+struct Local {
+    distribution: u32,
+}
+
+fn sampler_local(point: ShadingPoint) -> Local {
+    return Local(cache_word(select(1u, 0u, point.primary)));
+}
+
+fn sampler_draw(local: Local, u: u32) -> Choice {
+    let light = distribution_index(local.distribution, u);
+    return Choice(light, distribution_pmf(local.distribution, light));
+}
+
+fn sampler_pmf(local: Local, light: u32) -> f32 {
+    return distribution_pmf(local.distribution, light);
+}

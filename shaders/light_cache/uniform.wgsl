@@ -1,0 +1,29 @@
+// Every light alike. Header: count, units, longer, boundary, both probabilities.
+#import "light_cache/bindings.wgsl"
+
+struct Local {
+    point: ShadingPoint,
+}
+
+fn sampler_local(point: ShadingPoint) -> Local {
+    return Local(point);
+}
+
+// twin: crates/light-cache/src/uniform.rs sample
+fn sampler_draw(local: Local, u: u32) -> Choice {
+    let count = cache_word(0u);
+    if count < 2u {
+        return Choice(0u, f32(count));
+    }
+    let units = cache_word(1u);
+    let boundary = cache_word(3u);
+    if u < boundary {
+        return Choice(u / (units + 1u), cache_f32(4u));
+    }
+    return Choice(cache_word(2u) + (u - boundary) / units, cache_f32(5u));
+}
+
+// twin: crates/light-cache/src/uniform.rs pmf
+fn sampler_pmf(local: Local, light: u32) -> f32 {
+    return cache_f32(select(5u, 4u, light < cache_word(2u)));
+}

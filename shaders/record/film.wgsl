@@ -1,0 +1,33 @@
+// What the passes leave behind: sums per pixel, and observations. Rust: crates/render/src/gpu/layout.rs
+
+struct FilmPixel {
+    // R, G, B, luminance squared, each times the weight of its frame: the rounded sum, and what rounding lost.
+    hi: vec4<f32>,
+    lo: vec4<f32>,
+    weight_hi: f32,
+    weight_lo: f32,
+    count: u32,
+    nonfinite: u32,
+    // Of all frames, whatever was cleared.
+    rays_nearest: u32,
+    rays_occluded: u32,
+    // The light chosen first by the last sample; NONE for no light.
+    light: u32,
+    pad: u32,
+}
+
+// What an eye-path vertex found out about a light.
+struct Observation {
+    position_ws: vec3<f32>,
+    // NONE: no observation.
+    light: u32,
+    normal_ws: vec3<f32>,
+    flags: u32,
+    unshadowed: f32,
+    irradiance: f32,
+    pmf: f32,
+    pad: u32,
+}
+
+const OBSERVED_PRIMARY: u32 = 1u;
+const OBSERVED_VISIBLE: u32 = 2u;

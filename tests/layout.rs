@@ -1,0 +1,90 @@
+//! Records and names that Rust and the shaders share, checked without a GPU: naga reads the shaders as wgpu does.
+
+use light_cache::Scheme;
+use render::gpu::{FilmPixel, FrameParams, PackedObservation, files, link};
+use scene::packed::{PackedLight, SceneParams};
+use std::mem::offset_of;
+use std::path::Path;
+use wgpu::naga::{Module, TypeInner};
+
+/// Every pass with every sampler is one module.
+fn module(scheme: Scheme) -> Module {
+    let text = link("#import \"pass/path.wgsl\"\n", scheme).expect("every import has a file");
+    wgpu::naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
+}
+
+/// Names and offsets of a struct's members, and its size.
+fn layout(module: &Module, name: &str) -> (Vec<(String, usize)>, usize) {
+    let found = module.types.iter().find(|(_, ty)| ty.name.as_deref() == Some(name));
+    let Some((_, ty)) = found else {
+        panic!("no struct {name}")
+    };
+    let TypeInner::Struct { members, span } = &ty.inner else {
+        panic!("{name} is no struct")
+    };
+    let named = members
+        .iter()
+        .map(|m| (m.name.clone().expect("members have names"), m.offset as usize));
+    (named.collect(), *span as usize)
+}
+
+/// Asserts that a Rust record has the same members at the same places.
+macro_rules! same_layout {
+    ($module:expr, $shader:literal, $rust:ty: $($field:ident),* $(,)?) => {
+        let expected = vec![$((stringify!($field).to_owned(), offset_of!($rust, $field))),*];
+        assert_eq!(layout($module, $shader), (expected, size_of::<$rust>()), $shader);
+    };
+}
+
+#[test]
+fn records_lie_alike_in_memory() {
+    let module = &module(Scheme::Uniform);
+    same_layout!(module, "FrameParams", FrameParams: origin_ws, width, corner_ws, height, step_x_ws, frame, step_y_ws, weight,
+        seed, max_bounces, light_samples, clear, candidates, slots, first_row);
+    same_layout!(module, "FilmPixel", FilmPixel: hi, lo, weight_hi, weight_lo, count, nonfinite, rays_nearest, rays_occluded,
+        light, pad);
+    same_layout!(module, "Observation", PackedObservation: position_ws, light, normal_ws, flags, unshadowed, irradiance, pmf,
+        pad);
+    same_layout!(module, "SceneParams", SceneParams: fixed_root, top_root, placed, triangles, instances, meshes, materials,
+        textures, emitter_lights, albedo, srgb, light_count, radius, area_lights, pad0, pad1);
+    same_layout!(module, "Light", PackedLight: position_ws, kind, edge1_ws, area, edge2_ws, range, normal_ws, cos_inner,
+        intensity, cos_outer, primitive, pad);
+}
+
+#[test]
+fn passes_are_valid_and_keep_to_the_default_limits() {
+    use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
+    for scheme in [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive] {
+        let module = module(scheme);
+        let valid = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+        assert!(valid.is_ok(), "{scheme:?}: {:?}", valid.err());
+        let storage = module
+            .global_variables
+            .iter()
+            .filter(|(_, variable)| matches!(variable.space, wgpu::naga::AddressSpace::Storage { .. }));
+        assert!(storage.count() <= wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize);
+    }
+}
+
+/// A comment that names a function which is gone misleads: the shader may have been left behind.
+#[test]
+fn every_twin_is_still_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut twins = 0;
+    for (file, text) in files() {
+        for line in text.lines().filter_map(|line| line.trim().strip_prefix("// twin: ")) {
+            let (path, name) = line.split_once(' ').unwrap_or_else(|| panic!("{file}: '{line}'"));
+            let source = std::fs::read_to_string(root.join(path)).unwrap_or_else(|_| panic!("{file}: no file {path}"));
+            let defined = ["fn", "struct", "const", "enum"].iter().any(|keyword| {
+                let start = format!("{keyword} {name}");
+                source.match_indices(&start).any(|(at, _)| {
+                    let next = source[at + start.len()..].chars().next();
+                    !next.is_some_and(|c| c.is_alphanumeric() || c == '_')
+                })
+            });
+            assert!(defined, "{file}: {path} has no {name} any more");
+            twins += 1;
+        }
+    }
+    assert!(twins > 50, "only {twins} twins were found");
+}
