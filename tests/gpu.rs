@@ -240,6 +240,11 @@ fn images_at_the_same_seed_agree() {
             height: 30,
             method: Method::Sampled(kind),
             max_bounces,
+            // The device has none.
+            light: light_cache::Settings {
+                control_variate: false,
+                ..Default::default()
+            },
             ..Settings::default()
         };
         let cpu = rendered(&scene, &settings, frames, None);
