@@ -311,7 +311,7 @@ fn add_to_film(pixel: u32, radiance: vec3<f32>, log: Log) {
     sums.rays_nearest += log.rays_nearest;
     sums.rays_occluded += log.rays_occluded;
     sums.light = log.light;
-    // twin: crates/render/src/film.rs LARGEST
+    // The device adds in pairs of single precision, the CPU in double: what its squares would overflow is left out, and counted.
     let largest = 1e30;
     let size = abs(radiance.x) + abs(radiance.y) + abs(radiance.z);
     if is_finite(size) && size < largest {

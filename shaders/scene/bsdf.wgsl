@@ -65,6 +65,9 @@ fn albedo_at(albedo: SpecularAlbedo, cosine: f32) -> f32 {
     return dot(low * (1.0 - albedo.fraction) + high * albedo.fraction, albedo.reflectance);
 }
 
+// twin: crates/scene/src/bsdf.rs MOST_COUPLING
+const MOST_COUPLING: f32 = 2.0;
+
 // twin: crates/scene/src/bsdf/albedo.rs mean
 fn albedo_mean(albedo: SpecularAlbedo) -> f32 {
     let means = scene.albedo + 2u * ALBEDO_ROWS * ALBEDO_COLUMNS;
@@ -134,7 +137,7 @@ fn eval_layered(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>, cos_i: f32) -> B
     let mean = 1.0 - albedo_mean(albedo);
     var coupling = 0.0;
     if mean > 1e-6 {
-        coupling = max((1.0 - albedo_at(albedo, cos_i)) * (1.0 - albedo_o), 0.0) / mean;
+        coupling = min(max((1.0 - albedo_at(albedo, cos_i)) * (1.0 - albedo_o), 0.0) / mean, MOST_COUPLING);
     }
     return BsdfValue(specular + bsdf.diffuse * (coupling * lambert), pdf);
 }

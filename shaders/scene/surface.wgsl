@@ -178,7 +178,7 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
 
 // twin: crates/scene/src/surface.rs off_surface
 fn off_surface(surface: Surface, wi_ws: vec3<f32>) -> vec3<f32> {
-    let largest = max(max_element(abs(surface.position_ws)), scene.radius / 4096.0);
+    let largest = max(max_element(abs(surface.position_ws)), scene.radius / 32.0);
     let size = largest / 65536.0;
     return surface.geometric_normal_ws * select(size, -size, dot(wi_ws, surface.geometric_normal_ws) < 0.0);
 }

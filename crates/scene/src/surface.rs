@@ -165,7 +165,9 @@ impl Scene {
     #[inline]
     fn off_surface(&self, surface: &Surface, wi_ws: Vec3) -> Vec3 {
         const UNITS: f32 = 1.0 / 65_536.0;
-        const NEAR_ORIGIN: f32 = 1.0 / 4096.0;
+        // Eight units in the last place of the radius: the distance to a large triangle, met across an edge that it shares with this one, is no
+        // better known than that.
+        const NEAR_ORIGIN: f32 = 1.0 / 32.0;
         let largest = surface.position_ws.abs().max_element().max(self.radius * NEAR_ORIGIN);
         let length = (UNITS * largest).copysign(wi_ws.dot(surface.geometric_normal_ws));
         surface.geometric_normal_ws * length
