@@ -110,7 +110,7 @@ fn warps(bench: &mut Bench) {
         hazard,
         "uniform_disk",
         NEVER,
-        faults(&|u| !(uniform_disk(u).length() <= 1.000_001)),
+        faults(&|u| !(0.0..=1.000_001).contains(&uniform_disk(u).length())),
     );
     bench.check(
         hazard,
@@ -207,7 +207,8 @@ fn lights(bench: &mut Bench, scene: &Scene) {
                     let pdf = light.pdf_solid_angle(from, point.wi_ws, point.distance);
                     let finite =
                         point.wi_ws.is_finite() && point.radiance.is_finite() && point.pdf_solid_angle.is_finite();
-                    let fault = !finite || point.pdf_solid_angle <= 0.0 || point.distance.is_nan() || !(pdf >= 0.0);
+                    let fault =
+                        !finite || point.pdf_solid_angle <= 0.0 || point.distance.is_nan() || pdf.is_nan() || pdf < 0.0;
                     faults += u32::from(fault);
                 }
             }

@@ -151,7 +151,10 @@ impl Visitor for Walk<'_> {
         found.new_maximum = (records[1].max_contribution / 0.5 - 1.0).abs();
         let total: f64 = records.iter().map(|record| record.probability).sum();
         found.faults = u64::from((total - 1.0).abs() > 1e-6)
-            + records.iter().filter(|record| !(record.probability >= 0.0)).count() as u64;
+            + records
+                .iter()
+                .filter(|record| record.probability.is_nan() || record.probability < 0.0)
+                .count() as u64;
         found
     }
 }

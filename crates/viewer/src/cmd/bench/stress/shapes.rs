@@ -67,7 +67,7 @@ struct Deviations {
 impl Deviations {
     fn compare(&mut self, found: Option<f32>, expected: f64, condition: f64) {
         // Nearly a half space, or nearly nothing: not what is promised.
-        if expected < 1e-9 || expected > TAU - 0.1 {
+        if !(1e-9..=TAU - 0.1).contains(&expected) {
             return;
         }
         let error = (found.map_or(0.0, f64::from) / expected - 1.0).abs();

@@ -93,7 +93,7 @@ fn film(bench: &mut Bench, hazard: &str, frames: u32, value: fn(u32) -> f32, wei
         hazard,
         "film, variances below 0",
         NEVER,
-        f64::from(u8::from(!(found >= 0.0))),
+        f64::from(u8::from(found.is_nan() || found < 0.0)),
     );
     // What is beyond single precision is told as its largest or smallest number.
     let expected = (variance * luminance * luminance).min(f64::from(f32::MAX));
