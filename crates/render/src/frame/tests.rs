@@ -4,7 +4,7 @@ use super::*;
 use crate::{Image, Mis, PixelFilter, metric};
 use glam::Vec3;
 use light_cache::SamplerKind;
-use scene::{Instance, Light, LightKind, LightSource, Material, Mesh, PrimitiveId, SceneParts};
+use scene::{Instance, LightSource, Material, Mesh, SceneParts};
 
 /// A closed box [-1, 1]^3 seen from inside, all six sides of material 0; `lamp` adds a square of material 1 under its ceiling.
 fn box_scene(wall: Material, lamp: Option<Material>, points: &[(Vec3, Vec3)]) -> Scene {
@@ -44,22 +44,7 @@ fn box_scene(wall: Material, lamp: Option<Material>, points: &[(Vec3, Vec3)]) ->
         quad([at(-0.3, -0.3), at(0.3, -0.3), at(0.3, 0.3), at(-0.3, 0.3)], 1);
     }
     let point = |&(position_ws, intensity): &(Vec3, Vec3)| {
-        let light = Light {
-            kind: LightKind::Point,
-            double_sided: false,
-            textured: false,
-            position_ws,
-            edge1_ws: Vec3::ZERO,
-            edge2_ws: Vec3::ZERO,
-            normal_ws: Vec3::ZERO,
-            intensity,
-            area: 0.0,
-            range: f32::INFINITY,
-            cos_inner: 1.0,
-            cos_outer: 0.0,
-            power: 4.0 * std::f32::consts::PI * scene::luminance(intensity),
-            primitive: PrimitiveId::NONE,
-        };
+        let light = scene::assemble::point(position_ws, intensity);
         (light, LightSource::default())
     };
     let parts = SceneParts {

@@ -1,7 +1,7 @@
 //! Closed solids out of triangles: the clay of which the generated scenes are made.
 
 use super::dice::sin_cos;
-use crate::{Camera, Instance, Light, LightKind, LightSource, Material, Mesh, PrimitiveId, SceneParts, luminance};
+use crate::{Camera, Instance, Light, LightSource, Material, Mesh, SceneParts, assemble, luminance};
 use glam::{Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
@@ -294,20 +294,8 @@ impl Builder {
         let position_ws = self.pose.map_or(at, |pose| pose.point(at));
         let (node, mesh) = self.parts.origins[self.origin as usize].clone();
         let light = Light {
-            kind: LightKind::Point,
-            double_sided: false,
-            textured: false,
-            position_ws,
-            edge1_ws: Vec3::ZERO,
-            edge2_ws: Vec3::ZERO,
-            normal_ws: Vec3::ZERO,
-            intensity,
-            area: 0.0,
-            range: f32::INFINITY,
-            cos_inner: 1.0,
             cos_outer: -1.0,
-            power: 4.0 * PI * luminance(intensity),
-            primitive: PrimitiveId::NONE,
+            ..assemble::point(position_ws, intensity)
         };
         let source = LightSource {
             node,

@@ -1,0 +1,130 @@
+//! Frames whose direct light is found at every vertex in one way: the CPU's tiles, and learning from them.
+
+use super::{Eye, Frames};
+use crate::Film;
+use crate::choosing::{self, Choosing};
+use crate::direct::DirectLight;
+use crate::path::{Counters, TileLog, render_tile};
+use light_cache::{CellRecord, LightRecord, Observation, SamplerStats, ShadingPoint};
+use rayon::prelude::*;
+use scene::Scene;
+use std::ops::Add;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames with one way of finding direct light.
+pub(crate) struct Drawn<D> {
+    pub(crate) direct: D,
+    /// The frame with which the current sequence of random numbers began.
+    pub(crate) first_frame: u32,
+    /// What the last frame observed, one list per tile.
+    pub(crate) observations: Vec<Vec<Observation>>,
+}
+
+impl<D> Drawn<D> {
+    pub(crate) fn new(direct: D) -> Self {
+        Self {
+            direct,
+            first_frame: 0,
+            observations: Vec::new(),
+        }
+    }
+}
+
+impl<D: DirectLight> Drawn<D> {
+    /// Learns from what was observed in frame `frame`; returns whether something else is drawn from now on.
+    pub(crate) fn learn(&mut self, scene: &Scene, frame: u32) -> bool {
+        let before = self.direct.pace().lessons;
+        self.direct.end_frame(scene, &self.observations);
+        let learned = self.direct.pace().lessons != before;
+        if learned {
+            // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.
+            self.first_frame = frame.wrapping_add(1);
+        }
+        learned
+    }
+}
+
+impl<D: DirectLight> Frames for Drawn<D> {
+    fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
+        self.direct.set_eye(eye.camera.origin_ws);
+        self.observations.resize(film.tile_count(), Vec::new());
+    }
+
+    /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
+    /// nothing and their number changes nothing.
+    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
+        let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
+        let pace = self.direct.pace();
+        film.set_weight(pace.frame_weight);
+        let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
+        let counters = tiles.map(|(tile, observations)| {
+            observations.clear();
+            if stop.load(Ordering::Relaxed) {
+                return Counters::default();
+            }
+            let mut log = TileLog {
+                observations,
+                counters: Counters::default(),
+            };
+            render_tile::<D, AOVS>(&view, tile, &mut log);
+            log.counters
+        });
+        let counters = counters.reduce(Counters::default, Counters::add);
+        if stop.load(Ordering::Relaxed) {
+            return (counters, false);
+        }
+        self.learn(&eye.scene, eye.frame);
+        (counters, true)
+    }
+
+    fn scene_changed(&mut self, scene: &Scene) {
+        self.direct.scene_changed(scene);
+    }
+
+    fn prepare_s(&self) -> f64 {
+        0.0
+    }
+
+    fn sampler_stats(&self) -> Option<SamplerStats> {
+        self.direct.sampler_stats()
+    }
+
+    fn save(&self) -> Option<(u32, Vec<u8>)> {
+        Some((self.first_frame, self.direct.save()?))
+    }
+
+    fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool {
+        self.first_frame = first_frame;
+        self.direct.restore(learned)
+    }
+
+    fn light_records(&self, scene: &Scene) -> Vec<LightRecord> {
+        self.direct.records(scene)
+    }
+
+    fn cells(&self, scene: &Scene) -> Vec<CellRecord> {
+        self.direct.cells(scene)
+    }
+
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
+        points.par_iter().map(|point| self.direct.cell_at(point)).collect()
+    }
+
+    fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64> {
+        if self.direct.sampler_stats().is_none() {
+            return Vec::new();
+        }
+        let mut sums = vec![0.0; scene.lights.len()];
+        for point in points {
+            self.direct.add_pmfs(&self.direct.local(scene, point), &mut sums);
+        }
+        let count = points.len().max(1) as f64;
+        sums.iter_mut().for_each(|sum| *sum /= count);
+        sums
+    }
+
+    fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing> {
+        self.direct.sampler_stats()?;
+        Some(choosing::measure(eye, &self.direct))
+    }
+}
