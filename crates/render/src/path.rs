@@ -8,7 +8,7 @@ use glam::{Vec2, Vec3};
 use light_cache::{Observation, ShadingPoint};
 use sampling::hash::hash2;
 use sampling::mis::Heuristic;
-use sampling::{PixelSampler, PixelSequence, first_vertices, unit_f32};
+use sampling::{PixelSampler, PixelSequence, unit_f32};
 #[cfg(target_arch = "x86_64")]
 use scene::bvh::Kernel;
 use scene::bvh::{PACKET, Packet};
@@ -203,12 +203,11 @@ impl Starts {
     #[inline(always)]
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let first_pixel = y * view.image_width + x;
-        let in_pixel: [[u32; PACKET]; 2] =
-            view.pixel_sampler
-                .positions(view.seed, [x, y], view.image_width, view.frame);
+        let sampler = view.pixel_sampler;
+        let in_pixel: [[u32; PACKET]; 2] = sampler.numbers(view.seed, [x, y], view.image_width, view.frame, 0);
         let mut light_numbers = [[[0; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize];
         for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
-            *numbers = first_vertices(view.seed, first_pixel, index, 2);
+            *numbers = sampler.numbers(view.seed, [x, y], view.image_width, index, 2);
         }
         let mut rays = Packet {
             origin_ws: view.camera.origin_ws,
@@ -246,12 +245,11 @@ impl Start {
     /// In one pixel, without its neighbours.
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let pixel = y * view.image_width + x;
-        let [[u], [v]] = view
-            .pixel_sampler
-            .positions(view.seed, [x, y], view.image_width, view.frame);
+        let sampler = view.pixel_sampler;
+        let [[u], [v]] = sampler.numbers(view.seed, [x, y], view.image_width, view.frame, 0);
         let mut light_numbers = [LightNumbers::default(); MAX_LIGHT_SAMPLES as usize];
         for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
-            let [[choice], [u], [v]] = first_vertices(view.seed, pixel, index, 2);
+            let [[choice], [u], [v]] = sampler.numbers(view.seed, [x, y], view.image_width, index, 2);
             *numbers = LightNumbers { choice, point: [u, v] };
         }
         let direction_ws = eye_direction_ws(view, x, y, [u, v]);

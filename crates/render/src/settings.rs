@@ -147,7 +147,8 @@ pub struct Settings {
     pub oracle_passes: u32,
     /// Pixel filter.
     pub pixel_filter: PixelFilter,
-    /// How samples are spread over the area of a pixel, by the name of a [`PixelSampler`].
+    /// How samples are spread over the area of a pixel, the lights and the points on them, by the name of a [`PixelSampler`]. After the
+    /// first hit it is always Owen-scrambled Sobol'.
     #[serde(default, with = "pixel_sampler_name")]
     pub pixel_sampler: PixelSampler,
     /// How light sampling and BSDF sampling share what both can find.

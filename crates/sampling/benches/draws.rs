@@ -98,9 +98,13 @@ fn main() {
     let seed = black_box(7);
     measure_point_sets();
     for sampler in PixelSampler::ALL {
-        measure(&format!("positions in 8 pixels, {}", sampler.name()), |i| {
-            sampler.positions::<8>(u64::from(i & 1), [i & 1023, 5], 1024, i >> 10)
-        });
+        measure(
+            &format!(
+                "place in the pixel, choice and point on the light for 8 pixels, {}",
+                sampler.name()
+            ),
+            |i| sampler.numbers::<5, 8>(u64::from(i & 1), [i & 1023, 5], 1024, i >> 10, 0),
+        );
     }
     measure("counter-based number", |i| Random::new(seed, i >> 6, i & 63).u32(3));
     measure("first vertex: pixel 2, choice 1, point 2", |i| {

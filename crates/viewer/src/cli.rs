@@ -96,7 +96,7 @@ pub(crate) struct LightArgs {
     /// How samples are spread around a pixel's centre
     #[arg(long, value_enum, default_value_t = Filter::Box)]
     pub(crate) pixel_filter: Filter,
-    /// How samples are spread over a pixel's area
+    /// How samples are spread over a pixel's area, over the lights at the first hit and over each light
     #[arg(long, value_name = "NAME", default_value = PixelSampler::default().name(), value_parser = pixel_sampler())]
     pub(crate) pixel_sampler: PixelSampler,
     /// How drawing a light and meeting one by chance share what both can find; none = draw only
