@@ -1,5 +1,6 @@
 //! What the window and the thread that renders tell each other.
 
+use crate::cli::Backend;
 use crate::view::inspector::Inspection;
 use crate::view::views::{Shown, View};
 use glam::{Vec2, Vec3};
@@ -18,6 +19,8 @@ pub(in crate::view) enum Command {
     Look(Camera, Instant),
     /// Another size of the window, in pixels.
     Resize(u32, u32),
+    /// Something else renders.
+    Device(Backend),
     /// Another way of rendering; size and auxiliary images are not looked at.
     Render(Box<Settings>),
     /// Another view.
@@ -58,6 +61,8 @@ pub(in crate::view) enum Report {
     Saved(Result<PathBuf, String>),
     /// Something that the user should know.
     Trouble(String),
+    /// This renders from now on: what was asked for cannot.
+    Device(Backend),
 }
 
 /// A picture to be shown.
