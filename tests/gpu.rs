@@ -239,7 +239,7 @@ fn frequencies_of_the_gpu_are_its_probabilities() {
 }
 
 /// Renders on one back end.
-fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gpu>>) -> Vec<[f32; 3]> {
+pub(crate) fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gpu>>) -> Vec<[f32; 3]> {
     let camera = &scene.parts.cameras[0];
     let mut frame_loop: Box<dyn FrameLoop<'_> + '_> = match gpu {
         Some(gpu) => render::gpu::renderer(gpu, scene, camera, settings).expect("it fits"),
@@ -252,7 +252,27 @@ fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gp
     frame_loop.film().image().pixels.clone()
 }
 
-/// Learning, also from epochs that are thinned, later hits, instances, glossy surfaces: another light in one of a thousand samples may be drawn, all else is rounding.
+/// Renders on both back ends. Another light in one of a thousand samples may be drawn, all else is rounding.
+pub(crate) fn assert_images_agree(gpu: &Arc<Gpu>, scene: &Scene, settings: &Settings, frames: u32) {
+    let cpu = rendered(scene, settings, frames, None);
+    let device = rendered(scene, settings, frames, Some(gpu));
+    let differs = |(a, b): &(&[f32; 3], &[f32; 3])| {
+        a.iter()
+            .zip(b.iter())
+            .any(|(a, b)| (a - b).abs() > 1e-3 * a.abs().max(b.abs()) + 1e-6)
+    };
+    let different = cpu.iter().zip(&device).filter(differs).count();
+    let samples = cpu.len() * frames as usize * (1 + settings.max_bounces as usize);
+    let (name, method) = (&scene.parts.name, settings.method);
+    assert!(
+        different * 1000 <= samples,
+        "{name} {method:?}: {different} of {} pixels differ",
+        cpu.len()
+    );
+    assert!(cpu.iter().flatten().any(|&value| value > 0.0));
+}
+
+/// Learning, also from epochs that are thinned, later hits, glossy surfaces.
 #[test]
 fn images_at_the_same_seed_agree() {
     let Some(gpu) = gpu() else { return };
@@ -269,20 +289,7 @@ fn images_at_the_same_seed_agree() {
             max_bounces,
             ..Settings::default()
         };
-        let cpu = rendered(&scene, &settings, frames, None);
-        let device = rendered(&scene, &settings, frames, Some(gpu));
-        let differs = |(a, b): &(&[f32; 3], &[f32; 3])| {
-            a.iter()
-                .zip(b.iter())
-                .any(|(a, b)| (a - b).abs() > 1e-3 * a.abs().max(b.abs()) + 1e-6)
-        };
-        let different = cpu.iter().zip(&device).filter(differs).count();
-        let samples = cpu.len() * frames as usize * (1 + max_bounces as usize);
-        assert!(
-            different * 1000 <= samples,
-            "{demo} {kind:?}: {different} pixels differ"
-        );
-        assert!(cpu.iter().flatten().any(|&value| value > 0.0));
+        assert_images_agree(gpu, &scene, &settings, frames);
     }
 }
 

@@ -274,7 +274,13 @@ pub(crate) fn render_frames(
         progress.update(done, frames, pixels);
         each(frame_loop);
         if done >= 1.0 || watch.stopped() {
-            return Ok(seconds);
+            // A device may still be at work, or may have failed just now.
+            let start = Instant::now();
+            frame_loop.wait();
+            return match frame_loop.error() {
+                Some(error) => Err(of_gpu(error)),
+                None => Ok(seconds + start.elapsed().as_secs_f64()),
+            };
         }
     }
 }

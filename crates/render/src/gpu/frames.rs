@@ -186,7 +186,7 @@ impl<S: LightSampler> GpuFrames<S> {
         if let Some(timer) = &mut self.timer {
             timer.note(&self.gpu, passes);
         }
-        before.is_none_or(|before| self.gpu.wait_for(before))
+        before.is_none_or(|before| self.gpu.wait_for(before)) && self.gpu.error().is_none()
     }
 
     /// Lets the sampler learn from a frame, or at the end of some frames from all of them, and uploads what it draws from then on.

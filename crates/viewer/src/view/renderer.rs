@@ -472,6 +472,7 @@ impl Worker {
                 spp: film.spp(),
                 still,
                 view: self.view,
+                on_gpu: self.device.renders(),
                 size: (width, height),
                 frame_ms: stage.seconds * 1e3,
                 stages,

@@ -96,7 +96,10 @@ impl Run {
             let frames = active.iter().map(|a| a.run.frames.len() as u64).sum();
             progress.update(done / active.len() as f64, frames, pixels);
         }
-        Ok(active.into_iter().map(|active| active.finish(pass_times)).collect())
+        let finish = |(active, contestant): (Active<'_>, &Contestant)| {
+            active.finish(pass_times && matches!(contestant.back_end, BackEnd::Gpu(_)))
+        };
+        Ok(active.into_iter().zip(contestants).map(finish).collect())
     }
 
     /// Rays per second of the frames.
@@ -211,7 +214,7 @@ impl<'s> Active<'s> {
                 self.run.passes = self.renderer.pass_times();
             } else {
                 message::note(format!(
-                    "{}: no times of passes, there is no clock on a device",
+                    "{}: the adapter has no timestamps: no times of passes",
                     self.run.name
                 ));
             }

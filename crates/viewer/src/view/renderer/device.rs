@@ -89,3 +89,37 @@ impl Device {
         tell(Report::Device(Backend::Cpu));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sampling::PixelSampler;
+    use std::cell::RefCell;
+
+    /// Without a GPU in sight: what it lacks is known beforehand.
+    #[test]
+    fn what_the_device_cannot_do_is_done_on_the_cpu_and_said() {
+        let scene = Arc::new(scene::load("demo:one-light").expect("it is generated"));
+        let settings = Settings {
+            width: 4,
+            height: 4,
+            pixel_sampler: PixelSampler::Halton,
+            ..Settings::default()
+        };
+        let told = RefCell::new(Vec::new());
+        let tell = |report| told.borrow_mut().push(report);
+        let mut device = Device::new(Backend::Gpu);
+        let camera = scene.parts.cameras[0].clone();
+        let mut frames = device.start(&scene, &camera, &settings, &tell).expect("the CPU can");
+        assert!(frames.render_frame_unless(&std::sync::atomic::AtomicBool::new(false)));
+        assert!(!device.renders());
+        device.give_up("it is gone", &tell);
+        assert_eq!(device.wanted, Backend::Cpu);
+        let told = told.into_inner();
+        assert!(
+            matches!(&told[..], [Report::Trouble(first), Report::Trouble(second), Report::Device(Backend::Cpu)]
+                if first.contains("halton") && second.contains("it is gone")),
+            "{told:?}"
+        );
+    }
+}

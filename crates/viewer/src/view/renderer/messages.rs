@@ -84,6 +84,8 @@ pub(in crate::view) struct Figures {
     /// The camera rests: the picture has its full size.
     pub(in crate::view) still: bool,
     pub(in crate::view) view: View,
+    /// Rendered on the GPU.
+    pub(in crate::view) on_gpu: bool,
     /// Size in which it was rendered.
     pub(in crate::view) size: (u32, u32),
     /// Milliseconds of rendering per picture.
