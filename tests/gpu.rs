@@ -31,21 +31,13 @@ pub(crate) fn gpu() -> Option<&'static Arc<Gpu>> {
     found.as_ref()
 }
 
-/// Samplers that the back end has.
-const SAMPLERS: [SamplerKind; 5] = [
-    SamplerKind::Uniform,
-    SamplerKind::Power,
-    SamplerKind::Tree,
-    SamplerKind::Table,
-    SamplerKind::Adaptive,
-];
-
 /// What was asked at one point, and what the CPU says.
 struct Asked {
     words: [u32; 8],
     light: Option<u32>,
     drawn_pmf: f32,
     other_pmf: f32,
+    control: Vec3,
 }
 
 /// Asks a sampler that has learned from a few made-up observations.
@@ -56,6 +48,8 @@ struct Ask<'s> {
 }
 
 const ASKED: u32 = 1 << 13;
+/// How many of them are different.
+const POINTS: u32 = 1 << 10;
 
 impl Ask<'_> {
     fn point(&self, i: u32) -> ShadingPoint {
@@ -67,7 +61,7 @@ impl Ask<'_> {
                 primary: true,
             };
         }
-        let random = Random::new(8, i % 1024, 0);
+        let random = Random::new(8, i % POINTS, 0);
         let spread = |d| 2.0 * random.f32(d) - 1.0;
         ShadingPoint {
             position_ws: self.scene.center_ws + 0.5 * self.scene.radius * Vec3::new(spread(0), spread(1), spread(2)),
@@ -122,14 +116,24 @@ impl Visitor for Ask<'_> {
                 light: choice.map(|choice| choice.light),
                 drawn_pmf: choice.map_or(0.0, |choice| choice.pmf),
                 other_pmf: sampler.pmf(&local, other),
+                control: choice.map_or(Vec3::ZERO, |choice| choice.control),
             }
         };
         (sampler.pack().expect("the GPU has it"), (0..ASKED).map(asked).collect())
     }
 }
 
-/// What the GPU says: light, probability as drawn, as asked for, and of the other light.
-fn answers(gpu: &Gpu, packed: &Packed, asked: &[Asked]) -> Vec<(u32, [f32; 3])> {
+/// What the GPU says.
+struct Answer {
+    light: u32,
+    /// Probability as drawn, and as asked for.
+    drawn_pmf: f32,
+    asked_pmf: f32,
+    other_pmf: f32,
+    control: Vec3,
+}
+
+fn answers(gpu: &Gpu, packed: &Packed, asked: &[Asked]) -> Vec<Answer> {
     let input: Vec<u32> = asked.iter().flat_map(|asked| asked.words).collect();
     let kernel = Kernel {
         text: include_str!("kernels/sampler.wgsl"),
@@ -137,11 +141,17 @@ fn answers(gpu: &Gpu, packed: &Packed, asked: &[Asked]) -> Vec<(u32, [f32; 3])> 
         sobol: false,
     };
     let output = kernel
-        .run(gpu, &input, ASKED, 4 * asked.len())
+        .run(gpu, &input, ASKED, 8 * asked.len())
         .expect("the kernel runs");
-    let answers = output.chunks(4).map(|words| {
-        let [light, drawn, asked, other] = [words[0], words[1], words[2], words[3]];
-        (light, [drawn, asked, other].map(f32::from_bits))
+    let answers = output.chunks(8).map(|words| {
+        let number = |k: usize| f32::from_bits(words[k]);
+        Answer {
+            light: words[0],
+            drawn_pmf: number(1),
+            asked_pmf: number(2),
+            other_pmf: number(3),
+            control: Vec3::new(number(4), number(5), number(6)),
+        }
     });
     answers.collect()
 }
@@ -159,21 +169,38 @@ fn samplers_draw_the_same_lights_with_the_same_probabilities() {
     let Some(gpu) = gpu() else { return };
     for demo in ["demo:plaza:400", "demo:rooms:256"] {
         let scene = scene::load(demo).expect("it is generated");
-        for kind in SAMPLERS {
+        for kind in render::gpu::SAMPLERS {
             let (packed, asked) = ask(&scene, kind, false);
-            let (mut other_light, mut other_pmf) = (0, 0);
-            for (asked, (light, [drawn, queried, other])) in asked.iter().zip(answers(gpu, &packed, &asked)) {
-                let drew = (drawn > 0.0).then_some(light);
+            let (mut other_light, mut other_pmf, mut other_control, mut controlled) = (0, 0, 0, 0);
+            // What is expected at each point: controls are differences of such, rounded as these.
+            let size = |asked: &Asked| asked.control.abs().max_element();
+            let mut sizes = [0.0_f32; POINTS as usize];
+            for (asked, i) in asked.iter().zip((0..sizes.len()).cycle()) {
+                sizes[i] = sizes[i].max(size(asked));
+            }
+            for (i, (asked, answer)) in asked.iter().zip(answers(gpu, &packed, &asked)).enumerate() {
+                let drew = (answer.drawn_pmf > 0.0).then_some(answer.light);
                 if drew != asked.light {
                     other_light += 1;
                     continue;
                 }
-                other_pmf += u32::from(!near(drawn, asked.drawn_pmf) || !near(other, asked.other_pmf));
+                let (drawn, queried) = (answer.drawn_pmf, answer.asked_pmf);
+                other_pmf += u32::from(!near(drawn, asked.drawn_pmf) || !near(answer.other_pmf, asked.other_pmf));
                 assert!(
                     near(drawn, queried),
                     "{demo} {kind:?}: drawn with {drawn}, asked for {queried}"
                 );
+                let apart = (answer.control - asked.control).abs().max_element();
+                other_control += u32::from(apart.is_nan() || apart > 1e-5 * sizes[i % sizes.len()]);
+                controlled += u32::from(size(asked) > 0.0);
             }
+            if kind == SamplerKind::Adaptive {
+                assert!(controlled > ASKED / 4, "{demo}: {controlled} control variates");
+            }
+            assert!(
+                other_control * 1000 <= ASKED,
+                "{demo} {kind:?}: {other_control} other control variates"
+            );
             // Rounding moves the borders between lights, and a point may lie in another cell.
             assert!(
                 other_light * 1000 <= ASKED,
@@ -196,10 +223,10 @@ fn frequencies_of_the_gpu_are_its_probabilities() {
         let (packed, asked) = ask(&scene, kind, true);
         let mut counts = vec![0_u64; scene.lights.len()];
         let mut expected = vec![0.0; scene.lights.len()];
-        for (asked, (light, [drawn, _, other])) in asked.iter().zip(answers(gpu, &packed, &asked)) {
-            assert!(drawn > 0.0);
-            counts[light as usize] += 1;
-            expected[(asked.words[6] >> 1) as usize] = f64::from(other) * f64::from(ASKED);
+        for (asked, answer) in asked.iter().zip(answers(gpu, &packed, &asked)) {
+            assert!(answer.drawn_pmf > 0.0);
+            counts[answer.light as usize] += 1;
+            expected[(asked.words[6] >> 1) as usize] = f64::from(answer.other_pmf) * f64::from(ASKED);
         }
         let total: f64 = expected.iter().sum();
         assert!(
@@ -212,7 +239,7 @@ fn frequencies_of_the_gpu_are_its_probabilities() {
 }
 
 /// Renders on one back end.
-fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gpu>>) -> Vec<[f32; 3]> {
+pub(crate) fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gpu>>) -> Vec<[f32; 3]> {
     let camera = &scene.parts.cameras[0];
     let mut frame_loop: Box<dyn FrameLoop<'_> + '_> = match gpu {
         Some(gpu) => render::gpu::renderer(gpu, scene, camera, settings).expect("it fits"),
@@ -225,12 +252,32 @@ fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Option<&Arc<Gp
     frame_loop.film().image().pixels.clone()
 }
 
-/// Learning, later hits, instances, glossy surfaces: another light in one of a thousand samples may be drawn, all else is rounding.
+/// Renders on both back ends. Another light in one of a thousand samples may be drawn, all else is rounding.
+pub(crate) fn assert_images_agree(gpu: &Arc<Gpu>, scene: &Scene, settings: &Settings, frames: u32) {
+    let cpu = rendered(scene, settings, frames, None);
+    let device = rendered(scene, settings, frames, Some(gpu));
+    let differs = |(a, b): &(&[f32; 3], &[f32; 3])| {
+        a.iter()
+            .zip(b.iter())
+            .any(|(a, b)| (a - b).abs() > 1e-3 * a.abs().max(b.abs()) + 1e-6)
+    };
+    let different = cpu.iter().zip(&device).filter(differs).count();
+    let samples = cpu.len() * frames as usize * (1 + settings.max_bounces as usize);
+    let (name, method) = (&scene.parts.name, settings.method);
+    assert!(
+        different * 1000 <= samples,
+        "{name} {method:?}: {different} of {} pixels differ",
+        cpu.len()
+    );
+    assert!(cpu.iter().flatten().any(|&value| value > 0.0));
+}
+
+/// Learning, also from epochs that are thinned, later hits, glossy surfaces.
 #[test]
 fn images_at_the_same_seed_agree() {
     let Some(gpu) = gpu() else { return };
     let cases = [
-        ("demo:rooms", SamplerKind::Adaptive, 2, 5),
+        ("demo:rooms", SamplerKind::Adaptive, 2, 36),
         ("demo:spheres", SamplerKind::Table, 1, 2),
     ];
     for (demo, kind, max_bounces, frames) in cases {
@@ -240,27 +287,9 @@ fn images_at_the_same_seed_agree() {
             height: 30,
             method: Method::Sampled(kind),
             max_bounces,
-            // The device has none.
-            light: light_cache::Settings {
-                control_variate: false,
-                ..Default::default()
-            },
             ..Settings::default()
         };
-        let cpu = rendered(&scene, &settings, frames, None);
-        let device = rendered(&scene, &settings, frames, Some(gpu));
-        let differs = |(a, b): &(&[f32; 3], &[f32; 3])| {
-            a.iter()
-                .zip(b.iter())
-                .any(|(a, b)| (a - b).abs() > 1e-3 * a.abs().max(b.abs()) + 1e-6)
-        };
-        let different = cpu.iter().zip(&device).filter(differs).count();
-        let samples = cpu.len() * frames as usize * (1 + max_bounces as usize);
-        assert!(
-            different * 1000 <= samples,
-            "{demo} {kind:?}: {different} pixels differ"
-        );
-        assert!(cpu.iter().flatten().any(|&value| value > 0.0));
+        assert_images_agree(gpu, &scene, &settings, frames);
     }
 }
 

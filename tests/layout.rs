@@ -1,15 +1,15 @@
 //! Records and names that Rust and the shaders share, checked without a GPU: naga reads the shaders as wgpu does.
 
 use light_cache::Scheme;
-use render::gpu::{FilmPixel, FrameParams, PackedObservation, files, link};
+use render::gpu::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, Run, files, link};
 use scene::packed::{PackedLight, SceneParams};
 use std::mem::offset_of;
 use std::path::Path;
 use wgpu::naga::{Module, TypeInner};
 
 /// Every pass with every sampler is one module.
-fn module(scheme: Scheme) -> Module {
-    let text = link("#import \"pass/path.wgsl\"\n", scheme).expect("every import has a file");
+fn module(pass: &str, scheme: Scheme) -> Module {
+    let text = link(&format!("#import \"pass/{pass}.wgsl\"\n"), scheme).expect("every import has a file");
     wgpu::naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
 }
 
@@ -38,26 +38,34 @@ macro_rules! same_layout {
 
 #[test]
 fn records_lie_alike_in_memory() {
-    let module = &module(Scheme::Uniform);
+    let module = &module("path", Scheme::Uniform);
     same_layout!(module, "FrameParams", FrameParams: origin_ws, width, corner_ws, height, step_x_ws, frame, step_y_ws, weight,
-        seed, max_bounces, light_samples, clear, candidates, slots, first_row);
+        seed, max_bounces, light_samples, clear, candidates, slots, pad);
     same_layout!(module, "FilmPixel", FilmPixel: hi, lo, weight_hi, weight_lo, count, nonfinite, rays_nearest, rays_occluded,
-        light, pad);
+        pad0, pad1);
     same_layout!(module, "Observation", PackedObservation: position_ws, light, normal_ws, flags, unshadowed, irradiance, pmf,
-        pad);
+        weight);
     same_layout!(module, "SceneParams", SceneParams: fixed_root, top_root, placed, triangles, instances, meshes, materials,
         textures, emitter_lights, albedo, srgb, light_count, radius, area_lights, pad0, pad1);
     same_layout!(module, "Light", PackedLight: position_ws, kind, edge1_ws, area, edge2_ws, range, normal_ws, cos_inner,
         intensity, cos_outer, primitive, pad);
+    let module = &self::module("thin", Scheme::Uniform);
+    same_layout!(module, "LessonParams", LessonParams: frame, stride, pad0, pad1);
+    same_layout!(module, "LessonCounters", LessonCounters: observed, kept, runs, pad);
+    same_layout!(module, "Run", Run: frame, tile, first, count);
 }
 
 #[test]
 fn passes_are_valid_and_keep_to_the_default_limits() {
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-    for scheme in [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive] {
-        let module = module(scheme);
+    let paths = [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive].map(|scheme| ("path", scheme));
+    for (pass, scheme) in paths
+        .into_iter()
+        .chain([("tally", Scheme::Uniform), ("thin", Scheme::Uniform)])
+    {
+        let module = module(pass, scheme);
         let valid = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
-        assert!(valid.is_ok(), "{scheme:?}: {:?}", valid.err());
+        assert!(valid.is_ok(), "{pass} {scheme:?}: {:?}", valid.err());
         let storage = module
             .global_variables
             .iter()

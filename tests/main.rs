@@ -8,6 +8,8 @@ mod closed_form;
 mod gpu;
 /// Records that Rust and the shaders share.
 mod layout;
+/// Placed meshes and holes on the GPU back end.
+mod placed;
 /// What must hold for any scene: invariances, degenerate inputs, threads, probabilities.
 mod properties;
 /// A million lights.

@@ -11,6 +11,8 @@ const TABLE_PRIMARY: u32 = 8u;
 const TABLE_SECONDARY: u32 = 9u;
 // The table's part of the 32-bit random numbers.
 const TABLE_MASS: u32 = 10u;
+// Luminance of the irradiance that is 1 in the units of weights.
+const CUT_UNIT: u32 = 24u;
 
 // twin: crates/light-cache/src/adaptive/mod.rs CELL_SHIFT
 const CELL_SHIFT: u32 = 11u;
@@ -49,82 +51,74 @@ fn sampler_local(point: ShadingPoint) -> Local {
     return local;
 }
 
-// Where in the cut, or in the tree, a light is: its place and the width that is its own.
-// twin: crates/light-cache/src/adaptive/mod.rs pmf
-fn own_width(local: Local, place: u32) -> vec2<u32> {
+// A light at a point: the one at `place` in tree order if it `is_given`, or else the one that position `x` of what the table leaves draws.
+// Nothing where nothing can arrive: nothing is drawn there, not by the table either.
+// twin: crates/light-cache/src/adaptive/mod.rs chosen
+// twin: crates/light-cache/src/adaptive/mod.rs controlled
+fn choose(local: Local, is_given: bool, place: u32, x: vec2<u32>) -> Choice {
     let rest = wide_sub(UNIT_WIDTH, table_width());
+    var drawn = Drawn(place, vec2<u32>(0u));
+    var part: Part;
     if local.cut.count == 0u {
-        return descent_width(local.descent, place, rest);
-    }
-    let entry = entry_of(local.cut, place);
-    let part = cut_part(local.cut, local.receiver, true, entry, vec2<u32>(0u), wide_shift_right(rest, CELL_SHIFT));
-    if !part.found {
-        return vec2<u32>(0u);
-    }
-    let own = wide_shift_left(part.width, CELL_SHIFT);
-    if is_one_light(part.branch) {
-        return own;
-    }
-    if part.branch == DISTANT_BRANCH {
-        return width_of_distant(0u, local.receiver, place, own);
-    }
-    return width_in_node(0u, local.receiver, part.branch, place, own);
-}
-
-// Whether anything arrives at the point at all: where nothing does nothing is drawn, not by the table either.
-fn arrives(local: Local) -> bool {
-    if local.cut.count == 0u {
-        return !local.dead;
-    }
-    return cut_arrives(local.cut, local.receiver);
-}
-
-// twin: crates/light-cache/src/adaptive/mod.rs choice
-fn choice_of(local: Local, light: u32, own: vec2<u32>) -> Choice {
-    let of_table = distribution_pmf(local.table, light) * (f32(cache_word(TABLE_MASS)) / 4294967296.0);
-    return Choice(light, probability(own) + of_table);
-}
-
-// twin: crates/light-cache/src/adaptive/mod.rs sample
-fn sampler_draw(local: Local, u: u32) -> Choice {
-    if local.dead {
-        return Choice(0u, 0.0);
-    }
-    let position = position_in_unit(u, local.salt);
-    let of_table = table_width();
-    if wide_less(position, of_table) {
-        let stretched = wide_div(wide_shift_left(position, 1u), cache_word(TABLE_MASS));
-        let light = distribution_index(local.table, stretched);
-        return Choice(light, sampler_pmf(local, light));
-    }
-    let x = wide_sub(position, of_table);
-    let rest = wide_sub(UNIT_WIDTH, of_table);
-    var drawn: Drawn;
-    if local.cut.count == 0u {
-        drawn = descent_draw(local.descent, x, rest);
+        if local.dead {
+            return plain_choice(0u, 0.0);
+        }
+        if is_given {
+            drawn.width = descent_width(local.descent, place, rest);
+        } else {
+            drawn = descent_draw(local.descent, x, rest);
+        }
     } else {
-        let position_in_cut = wide_shift_right(x, CELL_SHIFT);
-        let part = cut_part(local.cut, local.receiver, false, 0u, position_in_cut, wide_shift_right(rest, CELL_SHIFT));
+        var entry = 0u;
+        if is_given {
+            entry = entry_of(local.cut, place);
+        }
+        let width = wide_shift_right(rest, CELL_SHIFT);
+        part = cut_part(local.cut, local.receiver, is_given, entry, wide_shift_right(x, CELL_SHIFT), width);
         if !part.found {
-            return Choice(0u, 0.0);
+            return plain_choice(0u, 0.0);
         }
         let own = wide_shift_left(part.width, CELL_SHIFT);
         let within = wide_sub(x, wide_shift_left(part.start, CELL_SHIFT));
         if is_one_light(part.branch) {
             drawn = Drawn(part.branch & ~LIGHT_BRANCH, own);
         } else if part.branch == DISTANT_BRANCH {
-            drawn = draw_distant(0u, local.receiver, within, own);
+            if is_given {
+                drawn.width = width_of_distant(0u, local.receiver, place, own);
+            } else {
+                drawn = draw_distant(0u, local.receiver, within, own);
+            }
+        } else if is_given {
+            drawn.width = width_in_node(0u, local.receiver, part.branch, place, own);
         } else {
             drawn = draw_in_node(0u, local.receiver, part.branch, within, own);
         }
     }
-    return choice_of(local, light_at(0u, drawn.place), drawn.width);
+    let light = light_at(0u, drawn.place);
+    let of_table = distribution_pmf(local.table, light) * (f32(cache_word(TABLE_MASS)) / 4294967296.0);
+    let pmf = probability(drawn.width) + of_table;
+    var control = vec3<f32>(0.0);
+    if local.cut.count != 0u && pmf > 0.0 {
+        let share = probability(drawn.width) / (probability(rest) * pmf);
+        control = cache_f32(CUT_UNIT) * (part.expected_total - part.expected_own * share);
+    }
+    return Choice(light, pmf, control);
+}
+
+// twin: crates/light-cache/src/adaptive/mod.rs sample
+fn sampler_draw(local: Local, u: u32) -> Choice {
+    let position = position_in_unit(u, local.salt);
+    let of_table = table_width();
+    let by_table = wide_less(position, of_table);
+    var place = 0u;
+    if by_table {
+        let stretched = wide_div(wide_shift_left(position, 1u), cache_word(TABLE_MASS));
+        place = place_of(0u, distribution_index(local.table, stretched));
+    }
+    return choose(local, by_table, place, wide_sub(position, of_table));
 }
 
 // twin: crates/light-cache/src/adaptive/mod.rs pmf
 fn sampler_pmf(local: Local, light: u32) -> f32 {
-    if !arrives(local) {
-        return 0.0;
-    }
-    return choice_of(local, light, own_width(local, place_of(0u, light))).pmf;
+    return choose(local, true, place_of(0u, light), vec2<u32>(0u)).pmf;
 }

@@ -22,6 +22,13 @@ struct ShadingPoint {
 struct Choice {
     light: u32,
     pmf: f32,
+    // Irradiance per channel to add to what the light brings: a control variate.
+    control: vec3<f32>,
+}
+
+// Without a control variate.
+fn plain_choice(light: u32, pmf: f32) -> Choice {
+    return Choice(light, pmf, vec3<f32>(0.0));
 }
 
 // Bits that differ from point to point.

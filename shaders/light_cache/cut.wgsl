@@ -29,6 +29,9 @@ struct Cut {
     attenuations: u32,
     // First light of each entry.
     firsts: u32,
+    // What entries are expected to bring over what they weigh, 4 words each, NO_FACTORS without a control variate.
+    expected: u32,
+    // Of the cube, two to an entry: first all for drawing, then all for what is expected.
     factors: u32,
 }
 
@@ -37,6 +40,9 @@ struct Part {
     branch: u32,
     start: vec2<u32>,
     width: vec2<u32>,
+    // What all entries together are expected to bring, and the part's entry over its share of the interval.
+    expected_total: vec3<f32>,
+    expected_own: vec3<f32>,
 }
 
 fn is_one_light(branch: u32) -> bool {
@@ -83,6 +89,7 @@ fn cut_at(cell: u32, cube: vec3<u32>) -> Cut {
     cut.entries = first.y >> 2u;
     cut.attenuations = first.z;
     cut.firsts = first.w;
+    cut.expected = cache[at + 1u].x;
     cut.factors = factors_at(cell, cube);
     return cut;
 }
@@ -103,9 +110,9 @@ fn entry_of(cut: Cut, place: u32) -> u32 {
     return low;
 }
 
-// Estimate of the irradiance at a point, as learned.
+// Estimate of the irradiance at a point, as learned by the cell as a whole.
 // twin: crates/light-cache/src/adaptive/emitter.rs importance
-fn entry_weight(cut: Cut, entry: u32, at: Receiver) -> f32 {
+fn entry_importance(cut: Cut, entry: u32, at: Receiver) -> f32 {
     if entry >= cut.count {
         return 0.0;
     }
@@ -147,25 +154,29 @@ fn entry_weight(cut: Cut, entry: u32, at: Receiver) -> f32 {
             strength = 0.0;
         }
     }
-    var weight = strength * (height * inverse_sq) * (plane * inverse_sq) + d.y;
-    if cut.factors != NO_FACTORS {
-        weight *= cache_f32(cut.factors + entry);
+    return strength * (height * inverse_sq) * (plane * inverse_sq) + d.y;
+}
+
+// By what the cube differs from the cell: how often the entry is drawn, and what it is expected to bring.
+// twin: crates/light-cache/src/adaptive/weights.rs Factors
+fn entry_factors(cut: Cut, entry: u32) -> vec2<f32> {
+    if cut.factors == NO_FACTORS || entry >= cut.count {
+        return vec2<f32>(1.0);
     }
-    return weight;
+    return vec2<f32>(cache_f32(cut.factors + entry), cache_f32(cut.factors + cut.count + entry));
+}
+
+// What the entry is expected to bring, by channel, over what it weighs, both without the factors of cubes.
+// twin: crates/light-cache/src/adaptive/weights.rs Expected
+fn entry_expected(cut: Cut, entry: u32) -> vec3<f32> {
+    if cut.expected == NO_FACTORS || entry >= cut.count {
+        return vec3<f32>(0.0);
+    }
+    return bitcast<vec4<f32>>(cache[(cut.expected >> 2u) + entry]).xyz;
 }
 
 fn entry_branch(cut: Cut, entry: u32) -> u32 {
     return cache[cut.entries + 4u * entry + 3u].z;
-}
-
-// Whether anything in the cut weighs anything at the point.
-fn cut_arrives(cut: Cut, at: Receiver) -> bool {
-    for (var entry = 0u; entry < cut.count; entry++) {
-        if entry_weight(cut, entry, at) > 0.0 {
-            return true;
-        }
-    }
-    return false;
 }
 
 // Where the part after a running sum ends in an interval of `width`: (sum / total) x width, rounded up, by long division of the two
@@ -240,6 +251,18 @@ fn running_sums(weights: array<f32, LANES>) -> array<f32, LANES> {
     return sums;
 }
 
+// By halves, as the CPU adds them.
+// twin: crates/light-cache/src/adaptive/weights.rs sum
+fn sum_of_lanes(lanes: array<vec3<f32>, LANES>) -> vec3<f32> {
+    var sums = lanes;
+    for (var half = LANES / 2u; half > 0u; half /= 2u) {
+        for (var i = 0u; i < half; i++) {
+            sums[i] += sums[i + half];
+        }
+    }
+    return sums[0];
+}
+
 struct Slice {
     index: u32,
     start: vec2<u32>,
@@ -277,19 +300,26 @@ fn cut_part(cut: Cut, at: Receiver, by_entry: bool, entry: u32, x: vec2<u32>, wi
     var part: Part;
     var lane = Slice(entry / cut.rows, vec2<u32>(0u), width);
     var row = Slice(entry % cut.rows, vec2<u32>(0u), vec2<u32>(0u));
+    var total_weight = 0.0;
+    var lanes_expected: array<vec3<f32>, LANES>;
     // First the lanes, then the rows of one lane: the same work on sums of rows and on single entries.
     for (var level = 0u; level < 2u; level++) {
         var weights: array<f32, LANES>;
         for (var k = 0u; k < LANES; k++) {
+            let first = select((lane.index * cut.rows) + k, k * cut.rows, level == 0u);
+            let count = select(select(0u, 1u, k < cut.rows), cut.rows, level == 0u);
             var sum = 0.0;
-            if level == 0u {
-                for (var r = 0u; r < cut.rows; r++) {
-                    sum += entry_weight(cut, k * cut.rows + r, at);
-                }
-            } else if k < cut.rows {
-                sum = entry_weight(cut, lane.index * cut.rows + k, at);
+            var expected = vec3<f32>(0.0);
+            for (var entry = first; entry < first + count; entry++) {
+                let importance = entry_importance(cut, entry, at);
+                let factors = entry_factors(cut, entry);
+                sum += importance * factors.x;
+                expected += (importance * factors.y) * entry_expected(cut, entry);
             }
             weights[k] = sum;
+            if level == 0u {
+                lanes_expected[k] = expected;
+            }
         }
         let sums = running_sums(weights);
         var total = sums;
@@ -300,13 +330,21 @@ fn cut_part(cut: Cut, at: Receiver, by_entry: bool, entry: u32, x: vec2<u32>, wi
             break;
         }
         if level == 0u {
+            total_weight = total[LANES - 1u];
+        }
+        if level == 0u {
             lane = slice_of(sums, by_entry, lane.index, x, width);
         } else {
             row = slice_of(sums, by_entry, row.index, wide_sub(x, lane.start), lane.width);
         }
     }
+    let found = lane.index * cut.rows + row.index;
+    let factors = entry_factors(cut, found);
     part.found = true;
-    part.branch = entry_branch(cut, min(lane.index * cut.rows + row.index, cut.count - 1u));
+    part.branch = entry_branch(cut, min(found, cut.count - 1u));
+    part.expected_total = sum_of_lanes(lanes_expected);
+    // The entry's share of the interval is its share of all weights.
+    part.expected_own = entry_expected(cut, found) * (total_weight * factors.y / factors.x);
     part.start = wide_add(lane.start, row.start);
     part.width = row.width;
     return part;

@@ -11,7 +11,7 @@ fn sampler_local(point: ShadingPoint) -> Local {
 
 fn sampler_draw(local: Local, u: u32) -> Choice {
     let light = distribution_index(local.distribution, u);
-    return Choice(light, distribution_pmf(local.distribution, light));
+    return plain_choice(light, distribution_pmf(local.distribution, light));
 }
 
 fn sampler_pmf(local: Local, light: u32) -> f32 {

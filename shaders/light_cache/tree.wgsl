@@ -14,10 +14,10 @@ fn sampler_local(point: ShadingPoint) -> Local {
 // twin: crates/light-cache/src/tree/sampler.rs sample
 fn sampler_draw(local: Local, u: u32) -> Choice {
     if !(local.descent.near > 0.0 || local.descent.far > 0.0) {
-        return Choice(0u, 0.0);
+        return plain_choice(0u, 0.0);
     }
     let drawn = descent_draw(local.descent, position_in_unit(u, local.salt), UNIT_WIDTH);
-    return Choice(light_at(0u, drawn.place), probability(drawn.width));
+    return plain_choice(light_at(0u, drawn.place), probability(drawn.width));
 }
 
 // twin: crates/light-cache/src/tree/sampler.rs pmf

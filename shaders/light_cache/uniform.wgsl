@@ -13,14 +13,14 @@ fn sampler_local(point: ShadingPoint) -> Local {
 fn sampler_draw(local: Local, u: u32) -> Choice {
     let count = cache_word(0u);
     if count < 2u {
-        return Choice(0u, f32(count));
+        return plain_choice(0u, f32(count));
     }
     let units = cache_word(1u);
     let boundary = cache_word(3u);
     if u < boundary {
-        return Choice(u / (units + 1u), cache_f32(4u));
+        return plain_choice(u / (units + 1u), cache_f32(4u));
     }
-    return Choice(cache_word(2u) + (u - boundary) / units, cache_f32(5u));
+    return plain_choice(cache_word(2u) + (u - boundary) / units, cache_f32(5u));
 }
 
 // twin: crates/light-cache/src/uniform.rs pmf

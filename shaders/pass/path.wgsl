@@ -49,7 +49,6 @@ struct Log {
     rays_occluded: u32,
     observations: u32,
     pixel: u32,
-    light: u32,
 }
 
 // A vertex joined with a point on a light, visibility unknown.
@@ -114,7 +113,7 @@ fn observe(vertex: Vertex, light: u32, pmf: f32, connection: Connection, visible
     let flags = select(0u, OBSERVED_PRIMARY, vertex.point.primary) | select(0u, OBSERVED_VISIBLE, visible);
     let at = (*log).pixel * frame.slots + (*log).observations;
     observations[at] = Observation(
-        vertex.point.position_ws, light, vertex.point.normal_ws, flags, unshadowed, irradiance, pmf, 0u,
+        vertex.point.position_ws, light, vertex.point.normal_ws, flags, unshadowed, irradiance, pmf, 1u,
     );
     (*log).observations += 1u;
 }
@@ -171,19 +170,21 @@ fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32,
     if RESAMPLES && candidates > 1u && connection.exists {
         pmf *= f32(candidates) * (shares[kept] / total);
     }
-    if vertex.point.primary && (*log).light == NONE {
-        (*log).light = choice.light;
-    }
     var visible = false;
     if connection.exists {
         (*log).rays_occluded += 1u;
         visible = !occluded(connection.shadow_ray, vertex.surface.id, connection.to_id);
     }
     observe(vertex, choice.light, pmf, connection, visible, log);
-    if visible {
-        return connection.unweighted * (connection.weight / (count * pmf));
+    var radiance = vec3<f32>(0.0);
+    if candidates == 1u {
+        // Whether or not the light arrives: the mean over all draws is zero.
+        radiance = vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
     }
-    return vec3<f32>(0.0);
+    if visible {
+        radiance += connection.unweighted * (connection.weight / (count * pmf));
+    }
+    return radiance;
 }
 
 // twin: crates/render/src/resampling.rs keep
@@ -310,7 +311,6 @@ fn add_to_film(pixel: u32, radiance: vec3<f32>, log: Log) {
     }
     sums.rays_nearest += log.rays_nearest;
     sums.rays_occluded += log.rays_occluded;
-    sums.light = log.light;
     // The device adds in pairs of single precision, the CPU in double: what its squares would overflow is left out, and counted.
     let largest = 1e30;
     let size = abs(radiance.x) + abs(radiance.y) + abs(radiance.z);
@@ -347,7 +347,7 @@ fn two_sum(a: vec4<f32>, b: vec4<f32>) -> TwoSum {
 @compute @workgroup_size(8, 8)
 fn path(@builtin(global_invocation_id) id: vec3<u32>) {
     let column = id.x;
-    let row = id.y + frame.first_row;
+    let row = id.y;
     if column >= frame.width || row >= frame.height {
         return;
     }
@@ -356,12 +356,12 @@ fn path(@builtin(global_invocation_id) id: vec3<u32>) {
     let offset = vec2<f32>(sequence_unit(numbers, 0u), sequence_unit(numbers, 1u));
     let at = vec2<f32>(f32(column), f32(row)) + offset;
     let direction_ws = normalize(frame.corner_ws + frame.step_x_ws * at.x + frame.step_y_ws * at.y);
-    var log = Log(0u, 0u, 0u, pixel, NONE);
+    var log = Log(0u, 0u, 0u, pixel);
     let radiance = path_radiance(pixel, Ray(frame.origin_ws, direction_ws, FAR), &log);
     add_to_film(pixel, radiance, log);
     if LEARNS {
         for (var slot = log.observations; slot < frame.slots; slot++) {
-            observations[pixel * frame.slots + slot].light = NONE;
+            observations[pixel * frame.slots + slot].light = NO_LIGHT;
         }
     }
 }

@@ -11,23 +11,25 @@ struct FilmPixel {
     // Of all frames, whatever was cleared.
     rays_nearest: u32,
     rays_occluded: u32,
-    // The light chosen first by the last sample; NONE for no light.
-    light: u32,
-    pad: u32,
+    pad0: u32,
+    pad1: u32,
 }
 
 // What an eye-path vertex found out about a light.
 struct Observation {
     position_ws: vec3<f32>,
-    // NONE: no observation.
+    // NO_LIGHT: no observation.
     light: u32,
     normal_ws: vec3<f32>,
     flags: u32,
     unshadowed: f32,
     irradiance: f32,
     pmf: f32,
-    pad: u32,
+    // How many such observations it stands for.
+    weight: u32,
 }
+
+const NO_LIGHT: u32 = 0xffffffffu;
 
 const OBSERVED_PRIMARY: u32 = 1u;
 const OBSERVED_VISIBLE: u32 = 2u;

@@ -19,8 +19,7 @@ struct FrameParams {
     candidates: u32,
     // Observations that a pixel has room for.
     slots: u32,
-    // First row of the image that this dispatch renders.
-    first_row: u32,
+    pad: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;

@@ -1,5 +1,5 @@
-// A light sampler at points: eight words in (position, normal, primary, a random number), four out: the light drawn, its probability as
-// drawn and as asked for, and the probability of the light whose number the thread's is.
+// A light sampler at points: eight words in (position, normal, another light and whether the point is a first hit, a random number),
+// eight out: the light drawn, its probability as drawn and as asked for, the probability of the other light, and the control variate.
 #import "light_cache/sampler.wgsl"
 
 @group(3) @binding(0) var<storage, read> input: array<vec4<u32>>;
@@ -24,5 +24,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         asked = sampler_pmf(local, choice.light);
     }
     let other = sampler_pmf(local, b.z >> 1u);
-    output[id.x] = vec4<u32>(choice.light, bitcast<u32>(choice.pmf), bitcast<u32>(asked), bitcast<u32>(other));
+    output[2u * id.x + 1u] = vec4<u32>(bitcast<vec3<u32>>(choice.control), 0u);
+    output[2u * id.x] = vec4<u32>(choice.light, bitcast<u32>(choice.pmf), bitcast<u32>(asked), bitcast<u32>(other));
 }

@@ -36,6 +36,7 @@ pub use octree::OctreeSampler;
 pub use packed::{Packed, Scheme};
 pub use power::PowerSampler;
 pub use records::Recording;
+pub use schedule::Thinning;
 pub use settings::{SamplerKind, Settings};
 pub use table::TableSampler;
 pub use tree::TreeSampler;
@@ -238,6 +239,17 @@ pub trait LightSampler: Debug + Send + Sync {
 
     /// Learns from a frame, or keeps it for later. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
+
+    /// How another back end may thin the observations of the coming frame, for [`LightSampler::end_thinned_frame`]; `None` if all are wanted.
+    fn thinning(&self) -> Option<Thinning> {
+        None
+    }
+
+    /// [`LightSampler::end_frame`] after observations were thinned as [`LightSampler::thinning`] said. `kept`: what is left of the frames since
+    /// it was last told of any, by frame and tile; it must be told of all by the last frame that is learned from together.
+    fn end_thinned_frame(&mut self, scene: &Scene, kept: Vec<Vec<Observation>>) {
+        self.end_frame(scene, &kept);
+    }
 
     /// All that it has learned, so that [`LightSampler::restore`] makes a sampler of the same scene and settings go on to the bit as this one
     /// would. `None` if it cannot be told; nothing for samplers that do not learn.

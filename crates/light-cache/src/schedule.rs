@@ -20,9 +20,6 @@ const SINGLE_FRAMES: u32 = 4;
 const FIRST_WEIGHTS: [f32; SINGLE_FRAMES as usize] = [0.0625, 0.5, 0.625, 0.625];
 /// Of how many frames' observations a longer epoch keeps as many. Higher values learn more; lower values are faster.
 const LESSON_FRAMES: u32 = 8;
-/// Observations kept of one frame, at most, but for surprising ones: larger images are thinned, so that learning costs the
-/// same at any size. Higher values learn more; lower values are faster.
-const MAX_OBSERVATIONS: usize = 1 << 16;
 /// A sample is surprising that adds this many times the mean of its tile. Higher values are faster; lower values find sooner what was
 /// overlooked.
 const SURPRISE: f32 = 2.0;
@@ -31,6 +28,35 @@ const SURPRISE_PER_WEIGHT: f32 = 0.25;
 
 /// Frames after which epochs grow as the sampler wishes; until then they double. A power of two.
 const EARLY_FRAMES: u32 = 16;
+
+/// How the observations of one frame are thinned, tile by tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Thinning {
+    /// Number of the frame: which observations are kept depends on it, and on tile and place in the tile's log.
+    pub frame: u32,
+    /// One in so many is kept for every [`Thinning::MAX_OBSERVATIONS`] that the frame has begun, besides those that surprise.
+    pub stride: u32,
+    /// Whether the frame is the first of those that are learned from together.
+    pub is_first: bool,
+    /// Whether it is the last.
+    pub is_last: bool,
+}
+
+impl Thinning {
+    /// Observations kept of one frame, at most, but for surprising ones: larger images are thinned, so that learning costs the
+    /// same at any size. Higher values learn more; lower values are faster.
+    pub const MAX_OBSERVATIONS: usize = 1 << 16;
+
+    /// For how many observations each kept one of a frame that has `count` stands.
+    pub fn weight(&self, count: usize) -> u32 {
+        self.stride * count.div_ceil(Self::MAX_OBSERVATIONS).max(1) as u32
+    }
+
+    /// More than are ever kept of one frame, for all that is likely: of those that surprise there are fewer than four in `weight`, or half.
+    pub fn most_kept(&self) -> usize {
+        6 * Self::MAX_OBSERVATIONS / self.stride as usize + 1024
+    }
+}
 
 /// Where a sampler is in the course of its learning.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -92,26 +118,49 @@ impl Schedule {
         }
     }
 
+    /// How the coming frame is thinned.
+    pub(crate) fn thinning(&self) -> Thinning {
+        let epoch = self.epoch();
+        Thinning {
+            frame: self.frame,
+            stride: ((epoch.end - epoch.start) / LESSON_FRAMES).max(1),
+            is_first: self.frame == epoch.start,
+            is_last: self.next_frame() == epoch.end,
+        }
+    }
+
     /// Ends a frame; at the end of an epoch, returns what is to be learned.
     pub(crate) fn end_frame<'l>(&mut self, logs: &'l [Vec<Observation>]) -> Option<Cow<'l, [Vec<Observation>]>> {
-        let epoch = self.epoch();
-        let length = epoch.end - epoch.start;
-        let count = logs.iter().map(Vec::len).sum::<usize>();
-        let weight = (length / LESSON_FRAMES).max(1) * count.div_ceil(MAX_OBSERVATIONS).max(1) as u32;
-        let frame = self.frame;
-        self.frame = (self.frame + 1).min(u32::MAX - 1);
-        if weight == 1 && length == 1 {
-            self.lessons = self.lessons.wrapping_add(1);
+        let thinning = self.thinning();
+        let weight = thinning.weight(logs.iter().map(Vec::len).sum());
+        if weight == 1 && thinning.is_first && thinning.is_last {
+            self.pass_frame();
             return Some(Cow::Borrowed(logs));
         }
         // Most tiles of a long epoch's frame leave nothing: even an empty list each would fill the memory in the end.
-        let kept = (0..).zip(logs).map(|(tile, log)| thinned(log, weight, [frame, tile]));
-        self.kept.extend(kept.filter(|log| !log.is_empty()));
-        if self.frame < epoch.end {
-            return None;
-        }
-        self.lessons = self.lessons.wrapping_add(1);
-        Some(Cow::Owned(std::mem::take(&mut self.kept)))
+        let kept = (0..)
+            .zip(logs)
+            .map(|(tile, log)| thinned(log, weight, [thinning.frame, tile]));
+        let kept = kept.filter(|log| !log.is_empty()).collect();
+        self.end_thinned_frame(kept).map(Cow::Owned)
+    }
+
+    /// The same of a frame that was thinned before; `kept` may hold what is left of earlier frames of the epoch too.
+    pub(crate) fn end_thinned_frame(&mut self, kept: Vec<Vec<Observation>>) -> Option<Vec<Vec<Observation>>> {
+        self.kept.extend(kept);
+        self.pass_frame().then(|| std::mem::take(&mut self.kept))
+    }
+
+    /// Returns whether an epoch has ended.
+    fn pass_frame(&mut self) -> bool {
+        let is_last = self.thinning().is_last;
+        self.frame = self.next_frame();
+        self.lessons = self.lessons.wrapping_add(u32::from(is_last));
+        is_last
+    }
+
+    fn next_frame(&self) -> u32 {
+        (self.frame + 1).min(u32::MAX - 1)
     }
 
     /// Bytes held.
@@ -250,12 +299,12 @@ mod tests {
 
     #[test]
     fn large_images_teach_no_more_than_small_ones() {
-        let logs: Vec<_> = (0..4).map(|_| log(MAX_OBSERVATIONS as u32)).collect();
+        let logs: Vec<_> = (0..4).map(|_| log(Thinning::MAX_OBSERVATIONS as u32)).collect();
         let mut schedule = Schedule::new(2);
         let lesson = schedule.end_frame(&logs).expect("first frames are learned from");
         let ordinary = lesson.iter().flatten().filter(|o| o.weight > 1).count();
         assert!(
-            ordinary.abs_diff(MAX_OBSERVATIONS) < MAX_OBSERVATIONS / 20,
+            ordinary.abs_diff(Thinning::MAX_OBSERVATIONS) < Thinning::MAX_OBSERVATIONS / 20,
             "{ordinary}"
         );
     }

@@ -13,7 +13,7 @@ use crate::brightness::Brightness;
 use crate::schedule::Schedule;
 use crate::{
     Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Scheme, Settings, ShadingPoint,
-    records, state,
+    Thinning, records, state,
 };
 use glam::Vec3;
 use sampling::Discrete;
@@ -312,6 +312,16 @@ impl LightSampler for TableSampler {
 
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
         if let Some(logs) = self.schedule.end_frame(logs) {
+            self.learn(&logs);
+        }
+    }
+
+    fn thinning(&self) -> Option<Thinning> {
+        Some(self.schedule.thinning())
+    }
+
+    fn end_thinned_frame(&mut self, _scene: &Scene, kept: Vec<Vec<Observation>>) {
+        if let Some(logs) = self.schedule.end_thinned_frame(kept) {
             self.learn(&logs);
         }
     }

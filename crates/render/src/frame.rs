@@ -4,6 +4,7 @@ use crate::choosing::Choosing;
 use crate::direct::OneLight;
 use crate::exact::AllLights;
 use crate::filter::FilterSampler;
+use crate::gpu::PassTime;
 use crate::oracle::Oracle;
 use crate::path::{Counters, FrameView};
 use crate::settings;
@@ -94,9 +95,31 @@ pub trait FrameLoop<'s>: Send {
     /// What has been accumulated. What a device holds is read back when it is asked for.
     fn film(&self) -> &Film;
 
+    /// Width and height of the film, which is not read back for that.
+    fn size(&self) -> (u32, u32);
+
+    /// [`Film::spp`], likewise.
+    fn spp(&self) -> u64;
+
+    /// [`RenderStats::sampler`] alone, likewise.
+    fn sampler_stats(&self) -> Option<SamplerStats>;
+
     /// Why no more frames are made, if so: the device that made them is gone. Never for the CPU.
     fn error(&self) -> Option<RenderError> {
         None
+    }
+
+    /// Waits until every frame is done: a device may still be at work on the last one. Nothing to do for the CPU.
+    fn wait(&mut self) {}
+
+    /// From the next frame on measures how long passes take on the device, which slows it down. Returns whether it can.
+    fn time_passes(&mut self) -> bool {
+        false
+    }
+
+    /// What was measured since [`FrameLoop::time_passes`].
+    fn pass_times(&self) -> Vec<PassTime> {
+        Vec::new()
     }
 
     /// Starts the image anew. No random number is drawn again.
@@ -287,6 +310,19 @@ pub(crate) trait Frames: Send {
         None
     }
 
+    /// See [`FrameLoop::wait`].
+    fn wait(&mut self) {}
+
+    /// See [`FrameLoop::time_passes`].
+    fn time_passes(&mut self) -> bool {
+        false
+    }
+
+    /// See [`FrameLoop::pass_times`].
+    fn pass_times(&self) -> Vec<PassTime> {
+        Vec::new()
+    }
+
     /// Called when the scene has changed, before [`Frames::look`].
     fn scene_changed(&mut self, scene: &Scene);
 
@@ -398,6 +434,30 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
 
     fn error(&self) -> Option<RenderError> {
         self.frames.error()
+    }
+
+    fn size(&self) -> (u32, u32) {
+        (self.film.width(), self.film.height())
+    }
+
+    fn spp(&self) -> u64 {
+        self.film.spp()
+    }
+
+    fn sampler_stats(&self) -> Option<SamplerStats> {
+        self.frames.sampler_stats()
+    }
+
+    fn wait(&mut self) {
+        self.frames.wait();
+    }
+
+    fn time_passes(&mut self) -> bool {
+        self.frames.time_passes()
+    }
+
+    fn pass_times(&self) -> Vec<PassTime> {
+        self.frames.pass_times()
     }
 
     fn restart(&mut self) {

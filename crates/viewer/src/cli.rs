@@ -1,8 +1,7 @@
 //! The command line: commands, and the options that several of them share.
 
-use crate::exit::Refusal;
 use crate::{cmd, machine, view};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use light_cache::SamplerKind;
@@ -87,9 +86,15 @@ pub(crate) struct LightArgs {
     /// Threads that render; default: RAYON_NUM_THREADS, or all processors
     #[arg(long, value_name = "N", alias = "nthreads", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// What renders; the GPU has the samplers uniform, power, table, tree and adaptive
-    #[arg(long, value_enum, default_value_t = Backend::Cpu)]
-    pub(crate) backend: Backend,
+    /// What renders; the GPU has the samplers uniform, power, table, tree and adaptive. `bench` compares several: cpu,gpu
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        value_name = "BACKEND",
+        default_value = "cpu"
+    )]
+    pub(crate) backend: Vec<Backend>,
     /// Camera of the scene, by name or by index
     #[arg(long, value_name = "NAME|INDEX")]
     pub(crate) camera: Option<String>,
@@ -160,20 +165,19 @@ impl SizeArgs {
 }
 
 impl LightArgs {
-    /// The settings of rendering that these options stand for, in a command that renders on the CPU only.
+    /// The back end, in a command that renders on one.
     ///
     /// # Errors
-    /// If a GPU is asked for.
-    pub(crate) fn settings(&self, method: Method, size: (u32, u32)) -> Result<render::Settings> {
-        if self.backend == Backend::Gpu {
-            let text = "this command renders on the CPU only (`render` and `dump` know the GPU); leave --backend away";
-            return Err(Refusal::NoGpu(text.into()).into());
+    /// If there are several.
+    pub(crate) fn one_backend(&self) -> Result<Backend> {
+        match self.backend[..] {
+            [backend] => Ok(backend),
+            _ => bail!("--backend: one is enough here; `bench` compares several"),
         }
-        Ok(self.settings_anywhere(method, size))
     }
 
-    /// The settings of rendering that these options stand for, whatever renders.
-    pub(crate) fn settings_anywhere(&self, method: Method, (width, height): (u32, u32)) -> render::Settings {
+    /// The settings of rendering that these options stand for.
+    pub(crate) fn settings(&self, method: Method, (width, height): (u32, u32)) -> render::Settings {
         render::Settings {
             width,
             height,

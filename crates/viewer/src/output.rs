@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use scene::file::{self, Pipe};
 use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Whether the name stands for stdout.
 pub(crate) fn is_stdout(path: &Path) -> bool {
@@ -19,6 +19,17 @@ pub(crate) fn check_writable(path: &Path) -> Result<()> {
         let path = path.display();
         format!("{path}: cannot write; check that its folder exists and is writable, and that it is no folder itself")
     })
+}
+
+/// Where things are kept that can be made again; `None` if the user has no such folder.
+pub(crate) fn cache_folder() -> Option<PathBuf> {
+    let variable = |name| {
+        std::env::var_os(name)
+            .filter(|value| !value.is_empty())
+            .map(PathBuf::from)
+    };
+    let base = variable("XDG_CACHE_HOME").or_else(|| Some(variable("HOME")?.join(".cache")))?;
+    Some(base.join("manylight"))
 }
 
 /// Writes a file by `fill`, see [`file::write`].

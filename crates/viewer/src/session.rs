@@ -4,12 +4,13 @@ use crate::cli::{Backend, BudgetArgs};
 use crate::exit::Refusal;
 use crate::interrupt::Watch;
 use crate::progress::Progress;
-use crate::{machine, message};
+use crate::{machine, message, output};
 use anyhow::{Context, Result, bail};
 use render::gpu::Gpu;
 use render::{FrameLoop, GpuFault, RenderError, SceneRef, Settings};
 use scene::{Camera, Scene};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A scene with how it came to be.
@@ -134,26 +135,59 @@ pub(crate) fn start<'s>(
     Ok(render::renderer(scene, camera, settings)?)
 }
 
-/// [`start`] on the CPU or on the GPU.
-///
-/// # Errors
-/// Those of [`start`]; [`Refusal::NoGpu`]; what the GPU lacks.
-pub(crate) fn start_on<'s>(
-    backend: Backend,
-    scene: impl Into<SceneRef<'s>>,
-    camera: &Camera,
-    settings: &Settings,
-) -> Result<(Box<dyn FrameLoop<'s> + 's>, String)> {
-    if backend == Backend::Cpu {
-        return Ok((start(scene, camera, settings)?, "cpu".into()));
+/// What renders, ready for use.
+#[derive(Clone, Debug)]
+pub(crate) enum BackEnd {
+    /// The processor.
+    Cpu,
+    /// An open device.
+    Gpu(Arc<Gpu>),
+}
+
+impl BackEnd {
+    /// Opens the device if there is one to open.
+    ///
+    /// # Errors
+    /// [`Refusal::NoGpu`].
+    pub(crate) fn open(backend: Backend) -> Result<Self> {
+        Ok(match backend {
+            Backend::Cpu => Self::Cpu,
+            Backend::Gpu => {
+                let folder = output::cache_folder().map(|folder| folder.join("pipelines"));
+                Self::Gpu(Gpu::open_with(folder.as_deref()).map_err(of_gpu)?)
+            }
+        })
     }
-    let gpu = Gpu::open().map_err(of_gpu)?;
-    let frames = render::gpu::renderer(&gpu, scene, camera, settings).map_err(of_gpu)?;
-    Ok((frames, format!("gpu: {}", gpu.info())))
+
+    /// [`start`] there.
+    ///
+    /// # Errors
+    /// Those of [`start`]; what the GPU lacks.
+    pub(crate) fn start<'s>(
+        &self,
+        scene: impl Into<SceneRef<'s>>,
+        camera: &Camera,
+        settings: &Settings,
+    ) -> Result<Box<dyn FrameLoop<'s> + 's>> {
+        match self {
+            Self::Cpu => start(scene, camera, settings),
+            Self::Gpu(gpu) => render::gpu::renderer(gpu, scene, camera, settings).map_err(of_gpu),
+        }
+    }
+}
+
+/// "cpu", or "gpu: " and the adapter.
+impl std::fmt::Display for BackEnd {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Cpu => f.write_str("cpu"),
+            Self::Gpu(gpu) => write!(f, "gpu: {}", gpu.info()),
+        }
+    }
 }
 
 /// Gives faults of the GPU their exit codes.
-fn of_gpu(error: RenderError) -> anyhow::Error {
+pub(crate) fn of_gpu(error: RenderError) -> anyhow::Error {
     match error {
         RenderError::Gpu { fault, what } => match fault {
             GpuFault::NoAdapter => Refusal::NoGpu(what).into(),
@@ -240,7 +274,13 @@ pub(crate) fn render_frames(
         progress.update(done, frames, pixels);
         each(frame_loop);
         if done >= 1.0 || watch.stopped() {
-            return Ok(seconds);
+            // A device may still be at work, or may have failed just now.
+            let start = Instant::now();
+            frame_loop.wait();
+            return match frame_loop.error() {
+                Some(error) => Err(of_gpu(error)),
+                None => Ok(seconds + start.elapsed().as_secs_f64()),
+            };
         }
     }
 }

@@ -9,7 +9,7 @@ use super::branch::Branch;
 use super::emitter::Emitter;
 use super::palette::Palette;
 use super::subcells::{Count, Cube, SubCells};
-use super::weights::{Factors, Lanes, Part, View, Wanted, Weighed, Weights};
+use super::weights::{Factors, Part, View, Wanted, Weighed, Weights};
 use crate::Observation;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 use glam::Vec3;
@@ -292,7 +292,7 @@ impl Cell {
     }
 
     /// See [`SubCells::factors_by_cube`].
-    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, &[Lanes])> {
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, Factors<'_>)> {
         self.subcells.factors_by_cube()
     }
 

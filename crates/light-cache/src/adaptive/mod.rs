@@ -29,7 +29,7 @@ use crate::schedule::Schedule;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Settings, ShadingPoint,
-    TableSampler, TreeVisibleSampler, records, state,
+    TableSampler, Thinning, TreeVisibleSampler, records, state,
 };
 use cell::{Lights, Nearby};
 use cells::Cells;
@@ -224,20 +224,23 @@ impl LightSampler for AdaptiveSampler {
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
         let start = Instant::now();
         self.frames += 1;
-        let frame = self.frames;
-        let Some(logs) = self.schedule.end_frame(logs) else {
-            return;
-        };
-        let logs = &*logs;
-        // First: what new cells believe of visibility is what the whole image has taught so far.
-        self.prior.learn(logs);
-        let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
-        let lights = Lights {
-            tree: prior.tree(),
-            palette: self.palette.as_ref(),
-        };
-        rayon::join(|| table.learn(logs), || cells.learn(lights, frame, logs));
-        self.learn_s += start.elapsed().as_secs_f64();
+        if let Some(logs) = self.schedule.end_frame(logs) {
+            self.learn(&logs);
+            self.learn_s += start.elapsed().as_secs_f64();
+        }
+    }
+
+    fn thinning(&self) -> Option<Thinning> {
+        Some(self.schedule.thinning())
+    }
+
+    fn end_thinned_frame(&mut self, _scene: &Scene, kept: Vec<Vec<Observation>>) {
+        let start = Instant::now();
+        self.frames += 1;
+        if let Some(logs) = self.schedule.end_thinned_frame(kept) {
+            self.learn(&logs);
+            self.learn_s += start.elapsed().as_secs_f64();
+        }
     }
 
     fn save(&self) -> Option<Vec<u8>> {
@@ -283,6 +286,19 @@ impl LightSampler for AdaptiveSampler {
 }
 
 impl AdaptiveSampler {
+    /// Learns from the observations of an epoch.
+    fn learn(&mut self, logs: &[Vec<Observation>]) {
+        let frame = self.frames;
+        // First: what new cells believe of visibility is what the whole image has taught so far.
+        self.prior.learn(logs);
+        let (table, prior, cells) = (&mut self.table, &self.prior, &mut self.cells);
+        let lights = Lights {
+            tree: prior.tree(),
+            palette: self.palette.as_ref(),
+        };
+        rayon::join(|| table.learn(logs), || cells.learn(lights, frame, logs));
+    }
+
     /// What the table has of the range of random numbers.
     #[inline]
     fn table_width(&self) -> u64 {

@@ -6,11 +6,12 @@ use crate::packed::{self, Packed, Scheme, align};
 use crate::{LightSampler, TableSampler};
 
 /// Words of the header; the tree's are the first.
-const HEADER: usize = 24;
-/// Where in the header the global table begins, the grid, and the cells.
+const HEADER: usize = 25;
+/// Where in the header the global table begins, the grid, the cells, and the unit of their weights.
 const TABLE: usize = packed::TREE_HEADER;
 const GRID: usize = TABLE + 3;
 const CELLS: usize = GRID + 10;
+const UNIT: usize = CELLS + 3;
 
 /// No such thing.
 const NONE: u32 = u32::MAX;
@@ -35,7 +36,8 @@ impl AdaptiveSampler {
         let cells = align(&mut words);
         words.extend(records.iter().flatten());
         let (table, bits) = pack_cubes(&cubes, &mut words);
-        words[CELLS..HEADER].copy_from_slice(&[cells, table, bits]);
+        words[CELLS..UNIT].copy_from_slice(&[cells, table, bits]);
+        words[UNIT] = self.cells.unit().to_bits();
         // Positions of words are 32-bit numbers.
         u32::try_from(words.len()).ok()?;
         Some(Packed {
@@ -68,15 +70,23 @@ fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<Cub
             words.extend([e.cone_scale, e.cone_offset, e.inverse_range_sq, 0.0].map(f32::to_bits));
         }
     }
+    let mut expected = NONE;
+    if cell.weights().is_controlled() {
+        expected = align(words);
+        for per_weight in cell.weights().expected(count) {
+            words.extend(per_weight.extend(0.0).to_array().map(f32::to_bits));
+        }
+    }
     let firsts = words.len() as u32;
     words.extend(cell.firsts());
     for (cube, factors) in cell.factors_by_cube() {
         cubes.push([number << 13 | cube, words.len() as u32]);
-        let rows = factors.len();
-        let in_order = (0..count).map(|entry| factors[entry % rows][entry / rows]);
-        words.extend(in_order.map(f32::to_bits));
+        for lanes in [factors.drawn, factors.expected] {
+            let rows = lanes.len();
+            words.extend((0..count).map(|entry| lanes[entry % rows][entry / rows].to_bits()));
+        }
     }
-    [count as u32, entries, attenuations, firsts, 0, 0, 0, 0]
+    [count as u32, entries, attenuations, firsts, expected, 0, 0, 0]
 }
 
 /// Appends a hash table, at most half full; returns where it is and the binary logarithm of its size.

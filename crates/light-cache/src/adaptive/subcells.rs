@@ -115,6 +115,14 @@ impl SubCell {
         }
     }
 
+    #[inline]
+    fn factors(&self) -> Factors<'_> {
+        Factors {
+            drawn: &self.drawn,
+            expected: &self.expected,
+        }
+    }
+
     fn bytes(&self) -> usize {
         size_of::<Self>()
             + self.counts.capacity() * size_of::<Count>()
@@ -161,22 +169,19 @@ impl SubCells {
     pub(super) fn factors(&self, cube: Cube) -> Factors<'_> {
         for (layer, bits) in self.layers.iter().zip(LAYERS).rev() {
             if let Some(subcell) = layer.subcells.get(usize::from(layer.numbers[cube.within(bits)])) {
-                return Factors {
-                    drawn: &subcell.drawn,
-                    expected: &subcell.expected,
-                };
+                return subcell.factors();
             }
         }
         Factors::default()
     }
 
     /// All factors, each with the number of its cube in its layer; bit 12 is set for the smallest cubes.
-    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, &[Lanes])> {
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, Factors<'_>)> {
         self.layers.iter().zip([0, 1 << 12]).flat_map(|(layer, bit)| {
             let numbered = (0..).zip(&layer.numbers);
             numbered.filter_map(move |(cube, &number)| {
-                let factors = &layer.subcells.get(usize::from(number))?.drawn;
-                (!factors.is_empty()).then_some((bit | cube, &factors[..]))
+                let subcell = layer.subcells.get(usize::from(number))?;
+                (!subcell.drawn.is_empty()).then(|| (bit | cube, subcell.factors()))
             })
         })
     }

@@ -202,6 +202,21 @@ impl Weights {
         })
     }
 
+    /// What each of the first `count` entries is expected to bring, by channel, over what it weighs, in tree order; nothing without
+    /// a control variate.
+    pub(super) fn expected(&self, count: usize) -> impl Iterator<Item = Vec3> {
+        let rows = self.expected.len();
+        (0..count).filter_map(move |entry| {
+            let Expected(channels) = self.expected.get(entry % rows.max(1))?;
+            Some(Vec3::from(channels.map(|lanes| lanes[entry / rows])))
+        })
+    }
+
+    /// Whether there is a control variate.
+    pub(super) fn is_controlled(&self) -> bool {
+        !self.expected.is_empty()
+    }
+
     /// Whether any entry is attenuated.
     pub(super) fn is_attenuated(&self) -> bool {
         !self.attenuation.is_empty()

@@ -33,8 +33,13 @@ impl<D> Drawn<D> {
 impl<D: DirectLight> Drawn<D> {
     /// Learns from what was observed in frame `frame`; returns whether something else is drawn from now on.
     pub(crate) fn learn(&mut self, scene: &Scene, frame: u32) -> bool {
+        self.learn_by(frame, |direct, observations| direct.end_frame(scene, observations))
+    }
+
+    /// [`Drawn::learn`] where something else is done at the end of a frame, given what was observed.
+    pub(crate) fn learn_by(&mut self, frame: u32, end_frame: impl FnOnce(&mut D, &[Vec<Observation>])) -> bool {
         let before = self.direct.pace().lessons;
-        self.direct.end_frame(scene, &self.observations);
+        end_frame(&mut self.direct, &self.observations);
         let learned = self.direct.pace().lessons != before;
         if learned {
             // What was learned depends on the numbers so far, and those to come in the same sequence depend on them too.

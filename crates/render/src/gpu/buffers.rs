@@ -59,16 +59,24 @@ pub(super) fn written(gpu: &Gpu, label: &str, size: u64) -> Result<wgpu::Buffer,
 
 /// Copies a buffer to the CPU and hands its bytes to `look`; `None` if the device is lost.
 pub(super) fn read<T>(gpu: &Gpu, buffer: &wgpu::Buffer, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
+    read_start(gpu, buffer, buffer.size() as usize, look)
+}
+
+/// The same with the first `size` bytes alone, a multiple of 4.
+pub(super) fn read_start<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: usize, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
+    if size == 0 {
+        return Some(look(&[]));
+    }
     let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read back"),
-        size: buffer.size(),
+        size: size as u64,
         usage: BufferUsages::COPY_DST | BufferUsages::MAP_READ,
         mapped_at_creation: false,
     });
     let mut encoder = gpu
         .device
         .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, buffer.size());
+    encoder.copy_buffer_to_buffer(buffer, 0, &copy, 0, size as u64);
     gpu.queue.submit([encoder.finish()]);
     copy.map_async(wgpu::MapMode::Read, .., |_| {});
     if !gpu.wait() {

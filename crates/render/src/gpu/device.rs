@@ -1,8 +1,11 @@
 //! Finding a device, and telling clearly why there is none.
 
+use super::pipelines::{Compiled, PipelineFile};
 use crate::RenderError;
 use crate::error::GpuFault;
+use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
+use wgpu::Features;
 
 /// What to do where no adapter is found.
 const NO_ADAPTER: &str =
@@ -54,6 +57,8 @@ pub struct Gpu {
     pub(crate) device: wgpu::Device,
     pub(crate) queue: wgpu::Queue,
     info: AdapterInfo,
+    pub(super) pipelines: Option<PipelineFile>,
+    pub(super) compiled: Compiled,
     /// What has gone wrong since, the first of it.
     fault: Arc<Mutex<Option<GpuFault>>>,
 }
@@ -64,6 +69,14 @@ impl Gpu {
     /// # Errors
     /// [`RenderError::Gpu`] with [`GpuFault::NoAdapter`] if there is none, or none that can do it.
     pub fn open() -> Result<Arc<Self>, RenderError> {
+        Self::open_with(None)
+    }
+
+    /// [`Gpu::open`]; compiled shaders are kept in `folder`, where the driver can.
+    ///
+    /// # Errors
+    /// Those of [`Gpu::open`].
+    pub fn open_with(folder: Option<&Path>) -> Result<Arc<Self>, RenderError> {
         let refuse = |what: String| GpuFault::NoAdapter.error(format!("{what}; {NO_ADAPTER}"));
         let instance = instance();
         let adapter = match pollster::block_on(wgpu::util::initialize_adapter_from_env(&instance, None)) {
@@ -85,6 +98,8 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("render"),
             required_limits: limits,
+            // Both are done without where they lack.
+            required_features: adapter.features() & (Features::TIMESTAMP_QUERY | Features::PIPELINE_CACHE),
             ..Default::default()
         }))
         .map_err(|error| refuse(format!("{} cannot be used ({error})", info.name)))?;
@@ -100,10 +115,13 @@ impl Gpu {
                 },
             );
         }));
+        let pipelines = folder.and_then(|folder| PipelineFile::open(&device, &info, folder));
         Ok(Arc::new(Self {
             device,
             queue,
             info: info.into(),
+            pipelines,
+            compiled: Compiled::default(),
             fault,
         }))
     }
@@ -142,6 +160,18 @@ impl Gpu {
     /// Waits until everything that was submitted is done; false if the device is lost.
     pub(crate) fn wait(&self) -> bool {
         let done = self.device.poll(wgpu::PollType::wait_indefinitely());
+        if let Err(error) = done {
+            note(&self.fault, GpuFault::Lost(error.to_string()));
+        }
+        self.error().is_none()
+    }
+
+    /// Waits until `submission` is done; false if the device is lost.
+    pub(super) fn wait_for(&self, submission: wgpu::SubmissionIndex) -> bool {
+        let done = self.device.poll(wgpu::PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        });
         if let Err(error) = done {
             note(&self.fault, GpuFault::Lost(error.to_string()));
         }

@@ -3,16 +3,17 @@
 use super::buffers::{read, storage, uniform, written};
 use super::device::Gpu;
 use super::layout::{FilmPixel, FrameParams, PackedObservation};
+use super::lessons::{LessonPasses, Lessons, read_all};
 use super::scene::SceneBuffers;
+use super::timing::{Pass, PassTime, Timer};
 use super::{refusal, shader};
 use crate::choosing::Choosing;
 use crate::direct::OneLight;
-use crate::film::TILE_SIZE;
 use crate::frame::{Drawn, Eye, Frames};
 use crate::path::{Counters, sequence_since};
 use crate::{Film, Method, RenderError, Settings};
 use ::scene::Scene;
-use light_cache::{CellRecord, LightRecord, LightSampler, Observation, Packed, SamplerStats, ShadingPoint};
+use light_cache::{CellRecord, LightRecord, LightSampler, Packed, SamplerStats, ShadingPoint, Thinning};
 use std::cell::OnceCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -26,12 +27,17 @@ pub(super) struct GpuFrames<S> {
     /// The sampler, and what it has of the CPU's frames.
     drawn: Drawn<OneLight<S>>,
     pipeline: wgpu::ComputePipeline,
+    /// `None` for samplers that do not learn.
+    lesson_passes: Option<LessonPasses>,
     params: wgpu::Buffer,
     frame_group: wgpu::BindGroup,
     scene_group: wgpu::BindGroup,
     cache: wgpu::Buffer,
     cache_group: wgpu::BindGroup,
     target: Option<Target>,
+    /// The last frame: no more than one is under way while the next is prepared.
+    submitted: Option<wgpu::SubmissionIndex>,
+    timer: Option<Timer>,
     /// Counts of films that are gone.
     counted: Counters,
     /// What the device has accumulated, since somebody asked.
@@ -45,8 +51,9 @@ struct Target {
     film: wgpu::Buffer,
     observations: wgpu::Buffer,
     group: wgpu::BindGroup,
-    /// Observations that a pixel has room for.
-    slots: u32,
+    /// Columns, rows, and observations that a pixel has room for.
+    size: [u32; 3],
+    lessons: Option<Lessons>,
 }
 
 impl<S: LightSampler> GpuFrames<S> {
@@ -60,6 +67,8 @@ impl<S: LightSampler> GpuFrames<S> {
         };
         let buffers = SceneBuffers::new(&gpu, scene)?;
         let pipeline = compile::<S>(&gpu, &packed, &buffers, settings)?;
+        let lesson_passes = S::LEARNS.then(|| LessonPasses::new(&gpu)).transpose()?;
+        gpu.keep_pipelines();
         let params = uniform(&gpu, "frame", bytemuck::bytes_of(&FrameParams::default()));
         let sobol = uniform(
             &gpu,
@@ -74,9 +83,12 @@ impl<S: LightSampler> GpuFrames<S> {
             drawn: Drawn::new(OneLight(sampler)),
             gpu,
             pipeline,
+            lesson_passes,
             params,
             cache,
             target: None,
+            submitted: None,
+            timer: None,
             counted: Counters::default(),
             film: OnceCell::new(),
             failure: None,
@@ -101,17 +113,30 @@ impl<S: LightSampler> GpuFrames<S> {
             pixels * u64::from(slots) * size_of::<PackedObservation>() as u64,
         )?;
         let group = group(&self.gpu, &self.pipeline, 3, &[(0, &film), (1, &observations)]);
+        let size = [eye.image_width, eye.image_height, slots];
+        let lessons = match &self.lesson_passes {
+            Some(passes) => Some(Lessons::new(&self.gpu, passes, &self.params, &observations, size)?),
+            None => None,
+        };
         Ok(Target {
             pixels,
             film,
             observations,
             group,
-            slots,
+            size,
+            lessons,
         })
     }
 
-    /// Submits a frame.
-    fn dispatch(&self, target: &Target, eye: &Eye<'_>, film: &Film, weight: f32) {
+    /// Submits a frame, and waits for the one before.
+    fn dispatch(
+        &mut self,
+        target: &mut Target,
+        eye: &Eye<'_>,
+        film: &Film,
+        weight: f32,
+        thinning: Option<&Thinning>,
+    ) -> bool {
         let (seed, frame) = sequence_since(eye.seed, eye.frame, self.drawn.first_frame);
         let camera = &eye.camera;
         let params = FrameParams {
@@ -128,8 +153,8 @@ impl<S: LightSampler> GpuFrames<S> {
             light_samples: eye.light_samples,
             clear: u32::from(film.spp() == 0),
             candidates: eye.candidates,
-            slots: target.slots,
-            first_row: 0,
+            slots: target.size[2],
+            pad: 0,
         };
         self.gpu
             .queue
@@ -139,10 +164,7 @@ impl<S: LightSampler> GpuFrames<S> {
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("path") });
         {
-            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
-                label: Some("path"),
-                timestamp_writes: None,
-            });
+            let mut pass = Pass::Path.begin(&mut encoder, self.timer.as_ref());
             pass.set_pipeline(&self.pipeline);
             for (index, group) in [&self.frame_group, &self.scene_group, &self.cache_group, &target.group]
                 .into_iter()
@@ -152,38 +174,37 @@ impl<S: LightSampler> GpuFrames<S> {
             }
             pass.dispatch_workgroups(eye.image_width.div_ceil(GROUP), eye.image_height.div_ceil(GROUP), 1);
         }
-        self.gpu.queue.submit([encoder.finish()]);
+        let mut passes = &[Pass::Path][..];
+        if let (Some(thinning), Some(lessons), Some(pipelines)) = (thinning, &mut target.lessons, &self.lesson_passes) {
+            lessons.encode(&self.gpu, pipelines, &mut encoder, thinning, self.timer.as_ref());
+            passes = &[Pass::Path, Pass::Tally, Pass::Thin];
+        }
+        if let Some(timer) = &self.timer {
+            timer.resolve(&mut encoder, passes);
+        }
+        let before = self.submitted.replace(self.gpu.queue.submit([encoder.finish()]));
+        if let Some(timer) = &mut self.timer {
+            timer.note(&self.gpu, passes);
+        }
+        before.is_none_or(|before| self.gpu.wait_for(before)) && self.gpu.error().is_none()
     }
 
-    /// What the frame has observed, in the order in which the CPU's tiles write it down.
-    fn observations(&self, target: &Target, eye: &Eye<'_>) -> Option<Vec<Vec<Observation>>> {
-        read(&self.gpu, &target.observations, |bytes| {
-            let all: &[PackedObservation] = bytemuck::cast_slice(bytes);
-            let (width, height, slots) = (eye.image_width, eye.image_height, target.slots as usize);
-            let starts = |end: u32| (0..end).step_by(TILE_SIZE as usize);
-            let tile = |x0: u32, y0: u32| {
-                let rows = y0..(y0 + TILE_SIZE).min(height);
-                let pixels =
-                    rows.flat_map(|y| (x0..(x0 + TILE_SIZE).min(width)).map(move |x| (y * width + x) as usize));
-                pixels
-                    .flat_map(|pixel| &all[pixel * slots..(pixel + 1) * slots])
-                    .filter_map(PackedObservation::get)
-                    .collect()
+    /// Lets the sampler learn from a frame, or at the end of some frames from all of them, and uploads what it draws from then on.
+    fn learn(&mut self, target: &mut Target, eye: &Eye<'_>, thinning: Option<&Thinning>) -> Result<(), RenderError> {
+        let learned = if let (Some(thinning), Some(lessons)) = (thinning, &mut target.lessons) {
+            let Some(kept) = lessons.end_frame(&self.gpu, thinning) else {
+                return Err(self.lost());
             };
-            starts(height)
-                .flat_map(|y0| starts(width).map(move |x0| (x0, y0)))
-                .map(|(x0, y0)| tile(x0, y0))
-                .collect()
-        })
-    }
-
-    /// Lets the sampler learn from a frame and uploads what it draws from then on.
-    fn learn(&mut self, target: &Target, eye: &Eye<'_>) -> Result<(), RenderError> {
-        let Some(observations) = self.observations(target, eye) else {
-            return Err(self.lost());
+            self.drawn
+                .learn_by(eye.frame, |direct, _| direct.0.end_thinned_frame(&eye.scene, kept))
+        } else {
+            let Some(observations) = read_all(&self.gpu, &target.observations, target.size) else {
+                return Err(self.lost());
+            };
+            self.drawn.observations = observations;
+            self.drawn.learn(&eye.scene, eye.frame)
         };
-        self.drawn.observations = observations;
-        if self.drawn.learn(&eye.scene, eye.frame) {
+        if learned {
             self.upload_sampler()?;
         }
         Ok(())
@@ -263,10 +284,6 @@ fn compile<S: LightSampler>(
     settings: &Settings,
 ) -> Result<wgpu::ComputePipeline, RenderError> {
     let text = shader::pass("path", packed.scheme)?;
-    let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
-        label: Some("path"),
-        source: wgpu::ShaderSource::Wgsl(text.into()),
-    });
     let resamples = matches!(settings.method, Method::Sampled(_)) && settings.candidates > 1;
     let heuristic = settings.mis.heuristic().map_or(4, |heuristic| heuristic as u32);
     let mut constants: Vec<(&str, f64)> = vec![
@@ -275,17 +292,7 @@ fn compile<S: LightSampler>(
         ("HEURISTIC", f64::from(heuristic)),
     ];
     constants.extend(scene.switches.iter().map(|&(name, on)| (name, f64::from(u8::from(on)))));
-    Ok(gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-        label: Some("path"),
-        layout: None,
-        module: &module,
-        entry_point: Some("path"),
-        compilation_options: wgpu::PipelineCompilationOptions {
-            constants: &constants,
-            ..Default::default()
-        },
-        cache: None,
-    }))
+    gpu.compile("path", &text, &constants)
 }
 
 impl<S: LightSampler> Frames for GpuFrames<S> {
@@ -308,18 +315,19 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
         if stop.load(Ordering::Relaxed) || self.failure.is_some() {
             return nothing;
         }
-        let Some(target) = self.target.take() else {
+        let Some(mut target) = self.target.take() else {
             return nothing;
         };
-        let weight = self.drawn.direct.0.pace().frame_weight;
+        let sampler = &self.drawn.direct.0;
+        let weight = sampler.pace().frame_weight;
+        let thinning = if S::LEARNS { sampler.thinning() } else { None };
         film.set_weight(weight);
-        self.dispatch(&target, eye, film, weight);
-        let result = if S::LEARNS {
-            self.learn(&target, eye)
-        } else if self.gpu.wait() {
-            Ok(())
-        } else {
+        let result = if !self.dispatch(&mut target, eye, film, weight, thinning.as_ref()) {
             Err(self.lost())
+        } else if S::LEARNS {
+            self.learn(&mut target, eye, thinning.as_ref())
+        } else {
+            Ok(())
         };
         self.target = Some(target);
         self.film = OnceCell::new();
@@ -352,6 +360,21 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
 
     fn error(&self) -> Option<RenderError> {
         self.failure.clone()
+    }
+
+    fn wait(&mut self) {
+        if !self.gpu.wait() && self.failure.is_none() {
+            self.failure = Some(self.lost());
+        }
+    }
+
+    fn time_passes(&mut self) -> bool {
+        self.timer = Timer::new(&self.gpu);
+        self.timer.is_some()
+    }
+
+    fn pass_times(&self) -> Vec<PassTime> {
+        self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 
     fn prepare_s(&self) -> f64 {

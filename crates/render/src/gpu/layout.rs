@@ -23,7 +23,7 @@ pub struct FrameParams {
     pub clear: u32,
     pub candidates: u32,
     pub slots: u32,
-    pub first_row: u32,
+    pub pad: u32,
 }
 
 /// Sums of one pixel: `FilmPixel` in `shaders/record/film.wgsl`.
@@ -39,8 +39,8 @@ pub struct FilmPixel {
     pub nonfinite: u32,
     pub rays_nearest: u32,
     pub rays_occluded: u32,
-    pub light: u32,
-    pub pad: u32,
+    pub pad0: u32,
+    pub pad1: u32,
 }
 
 impl FilmPixel {
@@ -67,7 +67,7 @@ pub struct PackedObservation {
     pub unshadowed: f32,
     pub irradiance: f32,
     pub pmf: f32,
-    pub pad: u32,
+    pub weight: u32,
 }
 
 impl PackedObservation {
@@ -87,7 +87,40 @@ impl PackedObservation {
             irradiance: self.irradiance,
             pmf: self.pmf,
             visible: self.flags & Self::VISIBLE != 0,
-            weight: 1,
+            weight: self.weight,
         })
     }
+}
+
+/// How a frame's observations are thinned: `LessonParams` in `shaders/record/lesson.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader, and in `light_cache::Thinning`")]
+pub struct LessonParams {
+    pub frame: u32,
+    pub stride: u32,
+    pub pad0: u32,
+    pub pad1: u32,
+}
+
+/// How many observations there are: `LessonCounters` in `shaders/record/lesson.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader")]
+pub struct LessonCounters {
+    pub observed: u32,
+    pub kept: u32,
+    pub runs: u32,
+    pub pad: u32,
+}
+
+/// Observations of one tile: `Run` in `shaders/record/lesson.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader")]
+pub struct Run {
+    pub frame: u32,
+    pub tile: u32,
+    pub first: u32,
+    pub count: u32,
 }

@@ -3,10 +3,8 @@
 //! The scene is uploaded once, in the CPU's own records and with the CPU's own tree; a frame is one dispatch of
 //! `shaders/pass/path.wgsl`, whose functions are twins of those in `path.rs` and `direct.rs`. The random numbers are the same
 //! integers, and samplers draw from the same tables, so both back ends draw the same lights; images differ by rounding. The film stays on the
-//! device until somebody looks at it. Samplers learn on the CPU, from observations that the device has written down, and what they
-//! have learned is uploaded.
-//!
-//! `adaptive` draws without its control variate here.
+//! device until somebody looks at it. Samplers learn on the CPU, from observations that the device has written down and thinned; they are
+//! read when an epoch is over, and what was learned is uploaded.
 //!
 //! Needs WebGPU's default limits and no feature; larger limits are used where the adapter has them.
 
@@ -15,22 +13,35 @@ mod device;
 mod frames;
 mod kernel;
 mod layout;
+mod lessons;
+mod pipelines;
 mod scene;
 mod shader;
+mod timing;
 
 pub use device::{AdapterInfo, Gpu, adapters};
 pub use kernel::Kernel;
-pub use layout::{FilmPixel, FrameParams, PackedObservation};
+pub use layout::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, Run};
 pub use shader::{files, link};
+pub use timing::PassTime;
 
 use crate::frame::{Rendering, SceneRef};
 use crate::{FrameLoop, Method, PixelFilter, RenderError, Settings};
 use ::scene::Camera;
 use frames::GpuFrames;
-use light_cache::{LightSampler, Recording, Visitor};
+use light_cache::{LightSampler, Recording, SamplerKind, Visitor};
 use sampling::PixelSampler;
 use std::sync::Arc;
 use std::time::Instant;
+
+/// Samplers that it has.
+pub const SAMPLERS: [SamplerKind; 5] = [
+    SamplerKind::Uniform,
+    SamplerKind::Power,
+    SamplerKind::Tree,
+    SamplerKind::Table,
+    SamplerKind::Adaptive,
+];
 
 /// Starts a rendering on `gpu`.
 ///
@@ -43,9 +54,27 @@ pub fn renderer<'s>(
     camera: &Camera,
     settings: &Settings,
 ) -> Result<Box<dyn FrameLoop<'s> + 's>, RenderError> {
+    let kind = check(settings)?;
+    let scene = scene.into();
+    let starter = Starter {
+        gpu: gpu.clone(),
+        scene: scene.clone(),
+        camera,
+        settings,
+        start: Instant::now(),
+    };
+    light_cache::build(&scene, &settings.light, kind, starter)
+}
+
+/// The sampler that `settings` ask for, if this back end can do what they say.
+///
+/// # Errors
+/// [`RenderError::Setting`] for a setting out of range, or one that this back end lacks.
+pub fn check(settings: &Settings) -> Result<SamplerKind, RenderError> {
     settings.check()?;
-    let Method::Sampled(kind) = settings.method else {
-        return Err(refusal(format!("the sampler '{}'", settings.method.name())));
+    let kind = match settings.method {
+        Method::Sampled(kind) if SAMPLERS.contains(&kind) => kind,
+        _ => return Err(refusal(format!("the sampler '{}'", settings.method.name()))),
     };
     if settings.pixel_sampler != PixelSampler::Sobol {
         return Err(refusal(format!(
@@ -59,19 +88,7 @@ pub fn renderer<'s>(
     if settings.aovs {
         return Err(refusal("auxiliary images".into()));
     }
-    let scene = scene.into();
-    let starter = Starter {
-        gpu: gpu.clone(),
-        scene: scene.clone(),
-        camera,
-        settings,
-        start: Instant::now(),
-    };
-    let light = light_cache::Settings {
-        control_variate: false,
-        ..settings.light.clone()
-    };
-    light_cache::build(&scene, &light, kind, starter)
+    Ok(kind)
 }
 
 /// What is told of something that only the CPU has.

@@ -8,7 +8,7 @@ use crate::cli::{BudgetArgs, LightArgs, SizeArgs, default_method, sampled_method
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
-use crate::session::{self, Budget};
+use crate::session::{self, BackEnd, Budget};
 use crate::{message, output, table};
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
@@ -107,7 +107,7 @@ pub(crate) fn run(args: &DumpArgs) -> Result<Status> {
             args.sampler.name()
         );
     }
-    let mut settings = args.light.settings_anywhere(args.sampler, args.size.or((640, 360)));
+    let mut settings = args.light.settings(args.sampler, args.size.or((640, 360)));
     settings.record_lights = !args.cells;
     settings.check()?;
 
@@ -115,7 +115,7 @@ pub(crate) fn run(args: &DumpArgs) -> Result<Status> {
     let loaded = session::load_with_warnings(&args.scene)?;
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
-    let (mut frames, _) = session::start_on(args.light.backend, &loaded.scene, camera, &settings)?;
+    let mut frames = BackEnd::open(args.light.one_backend()?)?.start(&loaded.scene, camera, &settings)?;
     let budget = Budget::new(&args.budget, DEFAULT_SPP);
     let seconds = session::render_frames(frames.as_mut(), budget, &watch, "learning", |_| {})?;
 

@@ -8,7 +8,7 @@ use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
-use crate::session::{self, Budget, Loaded};
+use crate::session::{self, BackEnd, Budget, Loaded};
 use crate::tev::Display;
 use crate::{machine, message, output, table};
 use anyhow::{Context, Result, bail};
@@ -167,7 +167,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if let Some(path) = &args.resume {
         output::check_writable(path)?;
     }
-    let mut settings = args.light.settings_anywhere(args.sampler, args.size.or((1280, 720)));
+    let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)));
     settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
     settings.check()?;
     if settings.light.ignore_below > 0.0 {
@@ -181,7 +181,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     }
     let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
     let watch = Watch::rendering();
-    let (mut frames, backend) = session::start_on(args.light.backend, &loaded.scene, camera, &settings)?;
+    let back_end = BackEnd::open(args.light.one_backend()?)?;
+    let mut frames = back_end.start(&loaded.scene, camera, &settings)?;
+    if args.stats.is_some() && matches!(back_end, BackEnd::Gpu(_)) && !frames.time_passes() {
+        message::note("the adapter has no timestamps: no times of passes in the statistics");
+    }
     let title = format!("manylight {}", loaded.scene.parts.name);
     let mut display = args
         .display_server
@@ -230,9 +234,11 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         display.finish(&image);
     }
     let run = frames.stats();
+    let mut stats = Stats::new(&loaded, &camera.name, &settings, &run, interrupted, &back_end);
     // Measuring takes about as long as a frame: only where somebody will read the result.
-    let choosing = args.stats.as_ref().and_then(|_| frames.choosing());
-    let stats = Stats::new(&loaded, &camera.name, &settings, &run, choosing, interrupted, backend);
+    if args.stats.is_some() {
+        stats.measure(frames.as_ref());
+    }
     match format {
         Format::Part => parts::write(&args.output, &header, frames.as_ref())?,
         _ => {

@@ -2,6 +2,7 @@
 
 use super::camera_control::Motion;
 use super::views::View;
+use crate::cli::Backend;
 use glam::{Vec2, Vec3};
 use render::Method;
 use winit::keyboard::KeyCode;
@@ -27,6 +28,8 @@ pub(super) enum Action {
     Sample(Method),
     /// The next method in the list.
     NextSampler,
+    /// Renders on this.
+    Device(Backend),
     /// Bounces after the first surface.
     Bounces(u32),
     /// Lights drawn at the first surface.

@@ -14,6 +14,7 @@ use super::renderer::{Command, Figures, Renderer, Report};
 use super::script::Script;
 use super::settings_file::Remembered;
 use super::views::View;
+use crate::cli::Backend;
 use crate::exit::{Refusal, Status};
 use crate::{message, session};
 use anyhow::Result;
@@ -72,6 +73,8 @@ pub(super) struct App {
     proxy: EventLoopProxy<Event>,
     pub(super) renderer: Renderer,
     pub(super) settings: Settings,
+    /// What renders.
+    pub(super) backend: Backend,
     pub(super) budget_ms: f64,
     wanted_camera: Option<String>,
     window_size: (u32, u32),
@@ -116,13 +119,14 @@ impl App {
     pub(super) fn new(
         args: &ViewArgs,
         settings: Settings,
+        backend: Backend,
         script: Option<Script>,
         proxy: EventLoopProxy<Event>,
     ) -> Result<Self> {
         let to_window = proxy.clone();
         // If the window has gone nobody wants to know.
         let tell = move |report| drop(to_window.send_event(Event::Renderer(report)));
-        let renderer = Renderer::start(settings.clone(), tell)?;
+        let renderer = Renderer::start(settings.clone(), backend, tell)?;
         renderer.send(Command::Budget(args.frame_time));
         let egui = egui::Context::default();
         panels::use_theme(&egui);
@@ -147,6 +151,7 @@ impl App {
             proxy,
             renderer,
             settings,
+            backend,
             budget_ms: args.frame_time,
             wanted_camera: args.light.camera.clone(),
             window_size: (args.width, args.height),
@@ -424,6 +429,7 @@ impl App {
                 self.say(result.map_or_else(|text| text, |path| format!("{} written", path.display())));
             }
             Event::Renderer(Report::Trouble(text)) => self.say(text),
+            Event::Renderer(Report::Device(backend)) => self.backend = backend,
             Event::Loaded(what, result) => self.enter(what, *result),
         }
         self.request_frame();

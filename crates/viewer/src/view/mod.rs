@@ -94,7 +94,8 @@ fn milliseconds(text: &str) -> Result<f64, String> {
 pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
     let script = args.script.as_deref().map(Script::read).transpose()?;
     let path = args.camera_path.as_deref().map(camera_path::read).transpose()?;
-    let settings = args.light.settings(args.sampler, (1, 1))?;
+    let settings = args.light.settings(args.sampler, (1, 1));
+    let backend = args.light.one_backend()?;
     settings.check()?;
     session::use_threads(args.light.threads)?;
     let event_loop = EventLoop::with_user_event().build().map_err(|error| {
@@ -107,7 +108,7 @@ pub(crate) fn run(args: &ViewArgs) -> Result<Status> {
             "no window can be opened here ({why}); run it on a desktop, under `xvfb-run`, or use `manylight render`"
         ))
     })?;
-    let mut app = App::new(args, settings, script, event_loop.create_proxy())?;
+    let mut app = App::new(args, settings, backend, script, event_loop.create_proxy())?;
     app.driver.path = path.unwrap_or_default();
     event_loop.run_app(&mut app)?;
     app.outcome()

@@ -3,6 +3,7 @@
 //! While the camera moves, frames are small enough to keep the frame time; once it rests the picture is rendered in full
 //! and refined. A command that makes the picture worthless stops a frame in full size at once.
 
+mod device;
 mod messages;
 
 pub(super) use messages::{Command, Figures, Picture, Report, Stages};
@@ -11,7 +12,9 @@ use super::inspector;
 use super::resolution::Resolution;
 use super::views::{Shown, View};
 use crate::clean::Cleaner;
-use crate::{machine, session};
+use crate::cli::Backend;
+use crate::machine;
+use device::Device;
 use glam::{Vec2, Vec3};
 use light_cache::{SamplerKind, ShadingPoint};
 use render::image::{self, Channel};
@@ -48,7 +51,11 @@ impl Renderer {
     ///
     /// # Errors
     /// If the system gives no thread.
-    pub(super) fn start(settings: Settings, tell: impl Fn(Report) + Send + 'static) -> std::io::Result<Self> {
+    pub(super) fn start(
+        settings: Settings,
+        backend: Backend,
+        tell: impl Fn(Report) + Send + 'static,
+    ) -> std::io::Result<Self> {
         let (commands, receiver) = channel();
         let stop = Arc::new(AtomicBool::new(false));
         let latest = Arc::new(Mutex::new(None));
@@ -65,6 +72,7 @@ impl Renderer {
             wants_importance: false,
             resolution: Resolution::new(30.0),
             cleaner: Cleaner::default(),
+            device: Device::new(backend),
             stage: None,
         };
         let thread = std::thread::Builder::new()
@@ -124,6 +132,7 @@ struct Worker {
     resolution: Resolution,
     /// What earlier pictures knew, for the eyes.
     cleaner: Cleaner,
+    device: Device,
     stage: Option<Stage>,
 }
 
@@ -189,7 +198,7 @@ impl Worker {
     }
 
     fn has_work(&self) -> bool {
-        let unfinished = |stage: &Stage| stage.frames.film().spp() < FINISHED_SPP || self.size(stage).is_some();
+        let unfinished = |stage: &Stage| stage.frames.spp() < FINISHED_SPP || self.size(stage).is_some();
         !self.paused && self.window.0 > 0 && self.window.1 > 0 && self.stage.as_ref().is_some_and(unfinished)
     }
 
@@ -222,6 +231,11 @@ impl Worker {
                     self.begin_anew()
                 }
             }
+            Command::Device(backend) => {
+                self.device = Device::new(backend);
+                self.cleaner.forget();
+                self.begin_anew()
+            }
             Command::Show(view) => self.show(view, self.denoise),
             Command::Denoise(denoise) => self.show(self.view, denoise),
             Command::Budget(milliseconds) => {
@@ -236,7 +250,7 @@ impl Worker {
             Command::Pause(paused) => {
                 self.paused = paused;
                 // What has been rendered since the last picture is shown too.
-                if paused && self.stage.as_ref().is_some_and(|stage| stage.frames.film().spp() > 0) {
+                if paused && self.stage.as_ref().is_some_and(|stage| stage.frames.spp() > 0) {
                     self.publish();
                 }
                 Ok(())
@@ -271,10 +285,10 @@ impl Worker {
         let settings = Settings {
             width,
             height,
-            aovs: self.needs_aovs(),
+            aovs: self.wants_aovs(),
             ..self.settings.clone()
         };
-        let frames = session::start(scene.clone(), &camera, &settings)?;
+        let frames = self.device.start(&scene, &camera, &settings, &self.tell)?;
         self.stage = Some(Stage {
             base,
             scene,
@@ -310,8 +324,12 @@ impl Worker {
         }
     }
 
-    /// Whether the film must keep auxiliary images.
+    /// Whether the film keeps auxiliary images.
     fn needs_aovs(&self) -> bool {
+        self.wants_aovs() && !self.device.renders()
+    }
+
+    fn wants_aovs(&self) -> bool {
         self.view.needs_aovs() || (self.denoise && self.view == View::Image)
     }
 
@@ -319,10 +337,15 @@ impl Worker {
         let before = self.needs_aovs();
         (self.view, self.denoise) = (view, denoise);
         let now = self.needs_aovs();
+        if view.needs_aovs() && self.device.renders() {
+            (self.tell)(Report::Trouble(
+                "this view needs auxiliary images, which the GPU does not keep: choose the CPU in the settings".into(),
+            ));
+        }
         let Some(stage) = &mut self.stage else { return Ok(()) };
         stage.published = None;
         if before != now {
-            let (width, height) = (stage.frames.film().width(), stage.frames.film().height());
+            let (width, height) = stage.frames.size();
             stage.frames.set_film(width, height, now)?;
             stage.changed = Instant::now();
         }
@@ -352,11 +375,10 @@ impl Worker {
 
     /// The size that the film should get, if it has another.
     fn size(&self, stage: &Stage) -> Option<(u32, u32)> {
-        let film = stage.frames.film();
-        let now = (film.width(), film.height());
+        let now = stage.frames.size();
         let wanted = if stage.changed.elapsed() >= REST {
             self.window
-        } else if film.spp() == 0 {
+        } else if stage.frames.spp() == 0 {
             self.resolution.clone().moving_size(self.window)
         } else {
             now
@@ -381,8 +403,8 @@ impl Worker {
         }
 
         let start = Instant::now();
-        let film = stage.frames.film();
-        let pixels = u64::from(film.width()) * u64::from(film.height());
+        let (width, height) = stage.frames.size();
+        let pixels = u64::from(width) * u64::from(height);
         let count = self.resolution.frames_in_budget(pixels);
         for _ in 0..count {
             if still {
@@ -393,15 +415,23 @@ impl Worker {
                 stage.frames.render_frame();
             }
         }
+        stage.frames.wait();
+        if let Some(error) = stage.frames.error() {
+            self.device.give_up(&error.to_string(), &self.tell);
+            if let Err(error) = self.begin_anew() {
+                (self.tell)(Report::Trouble(format!("{error:#}")));
+            }
+            return;
+        }
         let seconds = start.elapsed().as_secs_f64();
         stage.seconds = seconds;
-        let learn_s = stage.frames.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
+        let learn_s = stage.frames.sampler_stats().map_or(0.0, |sampler| sampler.learn_s);
         stage.learned = [learn_s, learn_s - stage.learned[0]];
 
         // Making a picture of what was rendered is to take a third of the time at most.
         let between = BETWEEN_REFINEMENTS.max(stage.showing * 2);
         let due = stage.published.is_none_or(|at| at.elapsed() >= between);
-        if due || !still || stage.frames.film().spp() <= 2 {
+        if due || !still || stage.frames.spp() <= 2 {
             self.publish();
         }
         // What is done to the picture for the eyes counts while it moves: then it is done for every frame.
@@ -442,6 +472,7 @@ impl Worker {
                 spp: film.spp(),
                 still,
                 view: self.view,
+                on_gpu: self.device.renders(),
                 size: (width, height),
                 frame_ms: stage.seconds * 1e3,
                 stages,

@@ -1,5 +1,8 @@
 //! What `bench` compares: samplers, or the values of one knob.
 
+use crate::message;
+use crate::session::BackEnd;
+use anyhow::{Result, bail};
 use clap::ValueEnum;
 use render::{Method, Mis, Settings};
 use sampling::PixelSampler;
@@ -26,11 +29,21 @@ pub(super) struct Contestant {
     pub(super) name: String,
     /// How it renders; the seed is that of the first run.
     pub(super) settings: Settings,
+    /// What renders.
+    pub(super) back_end: BackEnd,
 }
 
 impl Contestant {
-    /// Every one of `methods`, with every value of `knob` if there is one. Otherwise as `settings` say.
-    pub(super) fn all(settings: &Settings, methods: &[Method], knob: Option<Knob>) -> Vec<Self> {
+    /// Every one of `methods` on each of `back_ends` that has it, with every value of `knob` if there is one. Otherwise as `settings` say.
+    ///
+    /// # Errors
+    /// If no back end has any.
+    pub(super) fn all(
+        settings: &Settings,
+        methods: &[Method],
+        knob: Option<Knob>,
+        back_ends: &[BackEnd],
+    ) -> Result<Vec<Self>> {
         let of_method = |&method: &Method| {
             let settings = Settings {
                 method,
@@ -38,18 +51,40 @@ impl Contestant {
             };
             let Some(knob) = knob else {
                 let name = method.name().into();
-                return vec![Self { name, settings }];
+                return vec![(name, settings)];
             };
-            let named = |(value, settings)| Self {
-                name: match methods {
-                    [_] => value,
-                    _ => format!("{} {value}", method.name()),
-                },
-                settings,
+            let named = |(value, settings)| match methods {
+                [_] => (value, settings),
+                _ => (format!("{} {value}", method.name()), settings),
             };
             knob.values(&settings).into_iter().map(named).collect()
         };
-        methods.iter().flat_map(of_method).collect()
+        let all: Vec<(String, Settings)> = methods.iter().flat_map(of_method).collect();
+        let mut contestants = Vec::new();
+        for back_end in back_ends {
+            for (name, settings) in &all {
+                let mut name = name.clone();
+                if let BackEnd::Gpu(_) = back_end {
+                    if let Err(error) = render::gpu::check(settings) {
+                        message::warn(format!("{name}: {error}"));
+                        continue;
+                    }
+                    // Beside the CPU's, whose names stay as they are.
+                    if back_ends.len() > 1 {
+                        name += " gpu";
+                    }
+                }
+                contestants.push(Self {
+                    name,
+                    settings: settings.clone(),
+                    back_end: back_end.clone(),
+                });
+            }
+        }
+        if contestants.is_empty() {
+            bail!("nothing is left to be compared");
+        }
+        Ok(contestants)
     }
 }
 
@@ -91,7 +126,7 @@ mod tests {
         let settings = Settings::default();
         for knob in Knob::value_variants().iter().copied().map(Some).chain([None]) {
             for methods in [&methods[..1], &methods[..]] {
-                let all = Contestant::all(&settings, methods, knob);
+                let all = Contestant::all(&settings, methods, knob, &[BackEnd::Cpu]).expect("the CPU has all");
                 assert!(all.len() >= methods.len());
                 for (i, a) in all.iter().enumerate() {
                     a.settings.check().expect("in range");

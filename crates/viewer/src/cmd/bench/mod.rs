@@ -10,10 +10,11 @@ mod stress;
 mod summary;
 
 use crate::camera_path;
-use crate::cli::{LightArgs, SizeArgs, any_method, seconds};
+use crate::cli::{Backend, LightArgs, SizeArgs, any_method, seconds};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::machine::Machine;
+use crate::session::BackEnd;
 use crate::{message, output, session};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -35,6 +36,7 @@ Examples:
   manylight bench demo:rooms --samplers tree,adaptive,oracle   how far from the best possible choice?
   manylight bench demo:rooms --scenario walk --samplers tree,adaptive    errors of single frames on the move
   manylight bench demo:spheres --vary mis --samplers adaptive --time 4      which heuristic is best?
+  manylight bench demo:rooms --samplers tree,adaptive --backend cpu,gpu --pass-times      what does the GPU gain?
   manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
   manylight bench --stress -o stress-out                       is anything wrong at the limits?
 
@@ -86,6 +88,9 @@ pub(crate) struct BenchArgs {
     /// Folder in which references are kept; default: the user's cache folder
     #[arg(long, value_name = "DIR")]
     reference_cache: Option<PathBuf>,
+    /// After its run let every contestant on a GPU render a few more frames whose passes are timed by the device's clock
+    #[arg(long, conflicts_with = "scenario")]
+    pass_times: bool,
     #[command(flatten)]
     size: SizeArgs,
     #[command(flatten)]
@@ -143,7 +148,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     let mut times = args.time.clone();
     times.sort_by(f64::total_cmp);
     times.dedup();
-    let settings = args.light.settings(methods[0], args.size.or((256, 192)))?;
+    let settings = args.light.settings(methods[0], args.size.or((256, 192)));
     settings.check()?;
     make_output(&args.output, "summary.json")?;
     let cache = args
@@ -151,11 +156,20 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         .clone()
         .unwrap_or_else(|| reference::default_cache(&args.output));
     session::use_threads(args.light.threads)?;
+    let mut backends = args.light.backend.clone();
+    backends.dedup();
     if let Some(scenario) = args.scenario {
+        if backends != [Backend::Cpu] {
+            bail!("--scenario renders on the CPU only; leave --backend away");
+        }
         return scenario::run(args, scenario, path.as_deref(), &scenes, &methods, &settings, &cache);
     }
 
-    let contestants = Contestant::all(&settings, &methods, args.vary);
+    let back_ends: Vec<BackEnd> = backends.iter().map(|&b| BackEnd::open(b)).collect::<Result<_>>()?;
+    for back_end in &back_ends {
+        message::note(format!("back end: {back_end}"));
+    }
+    let contestants = Contestant::all(&settings, &methods, args.vary, &back_ends)?;
     let mut results = Vec::new();
     let mut interrupted = false;
     for what in &scenes {
@@ -182,6 +196,7 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
                 &reference,
                 &watch,
                 &what,
+                args.pass_times,
             )?);
         }
         interrupted = watch.stopped();

@@ -42,16 +42,7 @@ const SEEDS: [u64; 2] = [0x9E37_79B9_7F4A_7C15, 0xD1B5_4A32_D192_ED03];
 
 /// The user's cache folder for references, or one below `output` where there is none.
 pub(super) fn default_cache(output: &Path) -> PathBuf {
-    let variable = |name| {
-        std::env::var_os(name)
-            .filter(|value| !value.is_empty())
-            .map(PathBuf::from)
-    };
-    let base = variable("XDG_CACHE_HOME").or_else(|| Some(variable("HOME")?.join(".cache")));
-    base.map_or_else(
-        || output.join("references"),
-        |base| base.join("manylight").join("references"),
-    )
+    crate::output::cache_folder().map_or_else(|| output.join("references"), |folder| folder.join("references"))
 }
 
 impl Reference {

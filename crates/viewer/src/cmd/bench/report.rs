@@ -6,6 +6,7 @@ use crate::output;
 use crate::table::{align, number, thousands};
 use anyhow::Result;
 use render::Settings;
+use render::gpu::PassTime;
 use serde_json::json;
 use std::path::Path;
 
@@ -41,6 +42,22 @@ pub(super) fn table(result: &SceneResult) -> String {
         text += &errors_table(result, false, |point| number(point.to_oracle.unwrap_or(f64::NAN)));
     }
     for sampler in &result.samplers {
+        if !sampler.passes.is_empty() {
+            let of = |pass: &PassTime| {
+                format!(
+                    "{} {} ms (at most {})",
+                    pass.name,
+                    number(pass.mean_ms),
+                    number(pass.max_ms)
+                )
+            };
+            let passes: Vec<String> = sampler.passes.iter().map(of).collect();
+            text += &format!(
+                "{}, mean per frame on the device: {}\n",
+                sampler.sampler,
+                passes.join(", ")
+            );
+        }
         if let Some(note) = sampler.research {
             text += &format!("{}: {note}\n", sampler.sampler);
         }
@@ -70,6 +87,7 @@ fn times_table(result: &SceneResult) -> String {
         "build ms",
         "learn %",
         "choose %",
+        "Mrays/s",
         &efficiency,
         "x uniform",
         "x tree",
@@ -84,6 +102,7 @@ fn times_table(result: &SceneResult) -> String {
             .chain(times.map(number))
             .chain([number(s.light_build_s * 1e3)])
             .chain(shares.map(|share| number(share * 100.0)))
+            .chain([number(s.rays_per_s * 1e-6)])
             .chain(ratios.map(|value| number(value.unwrap_or(f64::NAN))))
             .collect()
     };
@@ -174,7 +193,7 @@ pub(super) fn write_all(folder: &Path, machine: &Machine, settings: &Settings, r
     let summary = json!({
         "date": machine::today(),
         "machine": machine,
-        "backend": "cpu",
+        "backends": back_ends(results),
         "settings": settings,
         "scenes": results,
     });
@@ -185,11 +204,23 @@ pub(super) fn write_all(folder: &Path, machine: &Machine, settings: &Settings, r
     output::write(&folder.join("setup.md"), setup(machine, settings, results).as_bytes())
 }
 
+/// What rendered.
+fn back_ends(results: &[SceneResult]) -> Vec<&str> {
+    let mut all: Vec<&str> = results
+        .iter()
+        .flat_map(|r| &r.samplers)
+        .map(|s| &s.backend[..])
+        .collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
 /// How the numbers came to be, and the tables.
 fn setup(machine: &Machine, settings: &Settings, results: &[SceneResult]) -> String {
     let mut text = format!(
         "# Benchmark of {}\n\n\
-         - manylight {}, commit {}, back end CPU\n\
+         - manylight {}, commit {}, back ends: {}\n\
          - {}, {} logical processors, {} threads, SIMD {}, {}\n\
          - {} x {} pixels, {} bounces, seeds from {}\n\n\
          Every run learns from scratch; light build and learning count, measuring does not. Efficiency is \
@@ -199,6 +230,7 @@ fn setup(machine: &Machine, settings: &Settings, results: &[SceneResult]) -> Str
         machine::today(),
         machine.version,
         machine.commit.unwrap_or("unknown"),
+        back_ends(results).join("; "),
         machine.cpu,
         machine.logical_cpus,
         machine.threads,

@@ -3,12 +3,17 @@
 use super::contestants::Contestant;
 use super::reference::Reference;
 use crate::interrupt::Watch;
+use crate::message;
 use crate::progress::Progress;
-use crate::session;
+use crate::session::{self, BackEnd};
 use anyhow::Result;
+use render::gpu::PassTime;
 use render::{Choosing, FrameLoop, ImageError, Settings};
 use scene::{Camera, Scene};
 use std::time::Instant;
+
+/// Frames that are timed pass by pass.
+const TIMED_FRAMES: u32 = 16;
 
 /// One frame of a run.
 #[derive(Clone, Debug)]
@@ -34,6 +39,10 @@ pub(super) struct Run {
     pub(super) learn_s: f64,
     /// What choosing lights cost after the last frame; `None` for methods without a choice.
     pub(super) choosing: Option<Choosing>,
+    /// Rays traced, of both kinds.
+    pub(super) rays: u64,
+    /// What the passes of further frames took on the device, if that was asked for.
+    pub(super) passes: Vec<PassTime>,
     /// All frames.
     pub(super) frames: Vec<Frame>,
 }
@@ -63,10 +72,14 @@ impl Run {
         reference: &Reference,
         watch: &Watch,
         what: &str,
+        pass_times: bool,
     ) -> Result<Vec<Self>> {
         let last = *times.last().expect("the command line asks for at least one time");
         let mut active = Vec::with_capacity(contestants.len());
         for contestant in contestants {
+            if nth == 0 {
+                compile(scene, camera, contestant)?;
+            }
             active.push(Active::start(scene, camera, contestant, nth)?);
         }
         let pixels = contestants.first().map_or(0, |Contestant { settings, .. }| {
@@ -78,12 +91,21 @@ impl Run {
             let Some(next) = behind.min_by(|a, b| a.elapsed_s.total_cmp(&b.elapsed_s)) else {
                 break;
             };
-            next.render_frame(times, reference);
+            next.render_frame(times, reference)?;
             let done: f64 = active.iter().map(|a| (a.elapsed_s / last).min(1.0)).sum();
             let frames = active.iter().map(|a| a.run.frames.len() as u64).sum();
             progress.update(done / active.len() as f64, frames, pixels);
         }
-        Ok(active.into_iter().map(Active::finish).collect())
+        let finish = |(active, contestant): (Active<'_>, &Contestant)| {
+            active.finish(pass_times && matches!(contestant.back_end, BackEnd::Gpu(_)))
+        };
+        Ok(active.into_iter().zip(contestants).map(finish).collect())
+    }
+
+    /// Rays per second of the frames.
+    pub(super) fn rays_per_s(&self) -> f64 {
+        let seconds = self.frames.iter().map(|frame| frame.frame_ms * 1e-3).sum::<f64>();
+        self.rays as f64 / seconds.max(f64::MIN_POSITIVE)
     }
 
     /// Parts of the frames' time that went into learning and into choosing.
@@ -104,13 +126,34 @@ impl Run {
     }
 }
 
+/// Has a device compile what it needs, which is kept for all runs and counts in none.
+fn compile(scene: &Scene, camera: &Camera, contestant: &Contestant) -> Result<()> {
+    if let BackEnd::Cpu = contestant.back_end {
+        return Ok(());
+    }
+    let start = Instant::now();
+    let mut frames = contestant.back_end.start(scene, camera, &contestant.settings)?;
+    // Some drivers do it when it is first needed.
+    frames.render_frame();
+    frames.wait();
+    if let Some(error) = frames.error() {
+        return Err(session::of_gpu(error));
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    message::note(format!(
+        "{}: shaders compiled in {seconds:.1} s, which count in no run",
+        contestant.name
+    ));
+    Ok(())
+}
+
 impl<'s> Active<'s> {
     fn start(scene: &'s Scene, camera: &Camera, contestant: &Contestant, nth: u64) -> Result<Self> {
         let settings = Settings {
             seed: contestant.settings.seed + nth,
             ..contestant.settings.clone()
         };
-        let renderer = session::start(scene, camera, &settings)?;
+        let renderer = contestant.back_end.start(scene, camera, &settings)?;
         let light_build_s = renderer.stats().light_build_s;
         Ok(Self {
             run: Run {
@@ -119,6 +162,8 @@ impl<'s> Active<'s> {
                 light_build_s,
                 learn_s: 0.0,
                 choosing: None,
+                rays: 0,
+                passes: Vec::new(),
                 frames: Vec::new(),
             },
             renderer,
@@ -128,9 +173,14 @@ impl<'s> Active<'s> {
     }
 
     /// Renders a frame, then measures if the number of frames is a power of two or one of the times has come.
-    fn render_frame(&mut self, times: &[f64], reference: &Reference) {
+    fn render_frame(&mut self, times: &[f64], reference: &Reference) -> Result<()> {
         let start = Instant::now();
         self.renderer.render_frame();
+        // The others shall not run at the same time.
+        self.renderer.wait();
+        if let Some(error) = self.renderer.error() {
+            return Err(session::of_gpu(error));
+        }
         let frame_s = start.elapsed().as_secs_f64();
         self.elapsed_s += frame_s;
         let count = self.run.frames.len() + 1;
@@ -150,11 +200,25 @@ impl<'s> Active<'s> {
             elapsed_s: self.elapsed_s,
             error,
         });
+        Ok(())
     }
 
-    fn finish(mut self) -> Run {
+    fn finish(mut self, pass_times: bool) -> Run {
         self.run.choosing = self.renderer.choosing();
-        self.run.learn_s = self.renderer.stats().sampler.map_or(0.0, |sampler| sampler.learn_s);
+        let stats = self.renderer.stats();
+        self.run.learn_s = stats.sampler.map_or(0.0, |sampler| sampler.learn_s);
+        self.run.rays = stats.rays_nearest + stats.rays_occluded;
+        if pass_times {
+            if self.renderer.time_passes() {
+                (0..TIMED_FRAMES).for_each(|_| self.renderer.render_frame());
+                self.run.passes = self.renderer.pass_times();
+            } else {
+                message::note(format!(
+                    "{}: the adapter has no timestamps: no times of passes",
+                    self.run.name
+                ));
+            }
+        }
         self.run
     }
 }

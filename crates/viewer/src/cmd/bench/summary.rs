@@ -4,6 +4,7 @@ use super::contestants::Contestant;
 use super::reference::{Facts, Reference};
 use super::run::{Frame, Run};
 use crate::session::Loaded;
+use render::gpu::PassTime;
 use render::{ImageError, Method};
 use serde::Serialize;
 
@@ -39,6 +40,8 @@ pub(super) struct SceneResult {
 pub(super) struct SamplerResult {
     /// Its name, and the value of the knob that is compared if there is one.
     pub(super) sampler: String,
+    /// "cpu", or "gpu: " and the adapter.
+    pub(super) backend: String,
     /// Number of runs.
     pub(super) seeds: usize,
     /// Frames of a run, median.
@@ -60,6 +63,10 @@ pub(super) struct SamplerResult {
     /// Part of the frames' time that went into choosing lights (timed after the last frame), median; `None` for methods
     /// without a choice, or where it is not counted.
     pub(super) choose_share: Option<f64>,
+    /// Rays per second of the frames, both kinds, median.
+    pub(super) rays_per_s: f64,
+    /// What passes took on the device after the last run, by its own clock; empty if not asked for.
+    pub(super) passes: Vec<PassTime>,
     /// What must be said of this method, if anything: it is for research.
     pub(super) research: Option<&'static str>,
     /// Errors at equal time.
@@ -185,7 +192,10 @@ impl SamplerResult {
             .take_while(|&count| count <= most);
         Self {
             sampler: contestant.name.clone(),
+            backend: contestant.back_end.to_string(),
             seeds: runs.len(),
+            rays_per_s: median(runs.iter().map(|run| run.rays_per_s()).collect()).unwrap_or(0.0),
+            passes: runs.last().map_or_else(Vec::new, |run| run.passes.clone()),
             frames: median(runs.iter().map(|run| run.frames.len() as f64).collect()).unwrap_or(0.0) as usize,
             frame_ms_median: quantile(&frame_ms, 0.5),
             frame_ms_p95: quantile(&frame_ms, 0.95),

@@ -5,7 +5,7 @@ use super::{Format, Made, RenderArgs, write};
 use crate::camera_path::{self, Frames};
 use crate::exit::Status;
 use crate::interrupt::Watch;
-use crate::session::{self, Budget, Loaded};
+use crate::session::{self, BackEnd, Budget, Loaded};
 use crate::{message, output};
 use anyhow::{Result, bail};
 use clap::Args;
@@ -101,7 +101,8 @@ pub(super) fn run(
     let Some((first, _)) = sequence.frames.first() else {
         return Ok(Status::Done);
     };
-    let (mut renderer, backend) = session::start_on(args.light.backend, &loaded.scene, first, settings)?;
+    let back_end = BackEnd::open(args.light.one_backend()?)?;
+    let mut renderer = back_end.start(&loaded.scene, first, settings)?;
     let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
     // By the first frame, if none is asked for: a film whose exposure jumps from picture to picture flickers.
     let mut exposure = args.exposure;
@@ -119,9 +120,8 @@ pub(super) fn run(
             &camera.name,
             settings,
             &renderer.stats(),
-            None,
             interrupted,
-            backend.clone(),
+            &back_end,
         );
         let made = Made {
             film,

@@ -1,8 +1,9 @@
 //! The figures of a rendering, for `--stats`.
 
 use crate::machine;
-use crate::session::Loaded;
-use render::{Choosing, RenderStats, Settings};
+use crate::session::{BackEnd, Loaded};
+use render::gpu::PassTime;
+use render::{Choosing, FrameLoop, RenderStats, Settings};
 use scene::{Report, Scene};
 use serde::Serialize;
 
@@ -45,6 +46,10 @@ pub(super) struct Stats {
     triangles: u64,
     rays_nearest: u64,
     rays_occluded: u64,
+    /// Both kinds, over `render_s`.
+    rays_per_s: f64,
+    /// What the passes of a frame took on the device, by its own clock; empty for the CPU and where there is no clock.
+    passes: Vec<PassTime>,
     nonfinite_samples: u64,
     cells: usize,
     min_probability: f64,
@@ -67,12 +72,10 @@ impl Stats {
         camera: &str,
         settings: &Settings,
         run: &RenderStats,
-        choosing: Option<Choosing>,
         interrupted: bool,
-        backend: String,
+        back_end: &BackEnd,
     ) -> Self {
         let threads = rayon::current_num_threads();
-        let frame_s = run.render_s / run.frames.max(1) as f64;
         let sampler = run.sampler.clone().unwrap_or_default();
         // The flag follows the setting, also where the sampler at hand has no use for it and says nothing.
         let asked = settings.light.ignore_below > 0.0;
@@ -81,7 +84,7 @@ impl Stats {
             scene: loaded.what.clone(),
             camera: camera.into(),
             version: machine::VERSION,
-            backend,
+            backend: back_end.to_string(),
             sampler: settings.method.name(),
             width: settings.width,
             height: settings.height,
@@ -97,8 +100,10 @@ impl Stats {
             render_s: run.render_s,
             learn_s: sampler.learn_s,
             learn_share: sampler.learn_s / run.render_s.max(f64::MIN_POSITIVE),
-            choosing,
-            choose_share: choosing.map(|choosing| choosing.share(frame_s, threads)),
+            choosing: None,
+            choose_share: None,
+            rays_per_s: (run.rays_nearest + run.rays_occluded) as f64 / run.render_s.max(f64::MIN_POSITIVE),
+            passes: Vec::new(),
             lights: loaded.scene.lights.len(),
             triangles: loaded.scene.triangle_count(),
             rays_nearest: run.rays_nearest,
@@ -115,6 +120,14 @@ impl Stats {
             settings: settings.clone(),
             report: loaded.scene.parts.report.clone(),
         }
+    }
+
+    /// Adds what takes time to find out.
+    pub(super) fn measure(&mut self, frames: &dyn FrameLoop<'_>) {
+        let frame_s = self.render_s / self.spp.max(1) as f64;
+        self.choosing = frames.choosing();
+        self.choose_share = self.choosing.map(|choosing| choosing.share(frame_s, self.threads));
+        self.passes = frames.pass_times();
     }
 }
 

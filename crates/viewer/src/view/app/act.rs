@@ -45,6 +45,10 @@ impl App {
                 self.change(|settings| settings.method = next);
                 self.say(format!("sampler: {}", next.name()));
             }
+            Action::Device(backend) => {
+                self.backend = backend;
+                self.renderer.send(Command::Device(backend));
+            }
             Action::Bounces(bounces) => self.change(|settings| settings.max_bounces = bounces),
             Action::LightSamples(samples) => self.change(|settings| settings.light_samples = samples),
             Action::Budget(milliseconds) => {

@@ -35,7 +35,7 @@ fn figures(ui: &mut egui::Ui, app: &App) {
         (_, true) => "refining",
         (_, false) => "moving",
     };
-    let noise = if app.denoise && app.view == View::Image {
+    let noise = if app.denoise && app.view == View::Image && !figures.on_gpu {
         ", denoised"
     } else {
         ""
@@ -95,7 +95,8 @@ fn figures(ui: &mut egui::Ui, app: &App) {
     );
     ui.add_space(3.0);
     let adapter = app.display.as_ref().map_or("", |display| display.adapter());
-    ui.label(theme::faint(format!("rendered on the CPU, shown by {adapter}")));
+    let device = if figures.on_gpu { "GPU" } else { "CPU" };
+    ui.label(theme::faint(format!("rendered on the {device}, shown by {adapter}")));
     ui.label(theme::faint("F1 all keys"));
 }
 

@@ -4,7 +4,7 @@ use super::super::actions::{Action, Part};
 use super::super::app::App;
 use super::super::views::View;
 use super::theme;
-use crate::cli;
+use crate::cli::{self, Backend};
 use egui::{ComboBox, Slider};
 use render::{MAX_LIGHT_SAMPLES, Method};
 
@@ -24,6 +24,18 @@ pub(super) fn show(ui: &mut egui::Ui, app: &mut App, actions: &mut Vec<Action>) 
     let mut bounces = app.settings.max_bounces;
     if slider(ui, "bounces", Slider::new(&mut bounces, 0..=8)) {
         actions.push(Action::Bounces(bounces));
+    }
+
+    theme::heading(ui, "Rendered on");
+    ui.horizontal(|ui| {
+        for (backend, name) in [(Backend::Cpu, "CPU"), (Backend::Gpu, "GPU")] {
+            if ui.selectable_label(app.backend == backend, name).clicked() {
+                actions.push(Action::Device(backend));
+            }
+        }
+    });
+    if app.backend == Backend::Gpu {
+        ui.label(theme::faint("raw samples: no noise is taken away here"));
     }
 
     theme::heading(ui, "Picture");

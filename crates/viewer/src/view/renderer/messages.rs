@@ -1,5 +1,6 @@
 //! What the window and the thread that renders tell each other.
 
+use crate::cli::Backend;
 use crate::view::inspector::Inspection;
 use crate::view::views::{Shown, View};
 use glam::{Vec2, Vec3};
@@ -18,6 +19,8 @@ pub(in crate::view) enum Command {
     Look(Camera, Instant),
     /// Another size of the window, in pixels.
     Resize(u32, u32),
+    /// Something else renders.
+    Device(Backend),
     /// Another way of rendering; size and auxiliary images are not looked at.
     Render(Box<Settings>),
     /// Another view.
@@ -58,6 +61,8 @@ pub(in crate::view) enum Report {
     Saved(Result<PathBuf, String>),
     /// Something that the user should know.
     Trouble(String),
+    /// This renders from now on: what was asked for cannot.
+    Device(Backend),
 }
 
 /// A picture to be shown.
@@ -79,6 +84,8 @@ pub(in crate::view) struct Figures {
     /// The camera rests: the picture has its full size.
     pub(in crate::view) still: bool,
     pub(in crate::view) view: View,
+    /// Rendered on the GPU.
+    pub(in crate::view) on_gpu: bool,
     /// Size in which it was rendered.
     pub(in crate::view) size: (u32, u32),
     /// Milliseconds of rendering per picture.

@@ -1,0 +1,125 @@
+//! How long passes take on the device, by its own clock.
+
+use super::buffers::read;
+use super::device::Gpu;
+
+/// A pass of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pass {
+    Path,
+    Tally,
+    Thin,
+}
+
+impl Pass {
+    const ALL: [Self; 3] = [Self::Path, Self::Tally, Self::Thin];
+
+    /// The name of its file and of its entry point.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Tally => "tally",
+            Self::Thin => "thin",
+        }
+    }
+
+    /// Begins it, timed if there is a timer.
+    pub(super) fn begin<'e>(
+        self,
+        encoder: &'e mut wgpu::CommandEncoder,
+        timer: Option<&Timer>,
+    ) -> wgpu::ComputePass<'e> {
+        let first = 2 * self as u32;
+        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some(self.name()),
+            timestamp_writes: timer.map(|timer| wgpu::ComputePassTimestampWrites {
+                query_set: &timer.queries,
+                beginning_of_pass_write_index: Some(first),
+                end_of_pass_write_index: Some(first + 1),
+            }),
+        })
+    }
+}
+
+/// A beginning and an end each.
+const QUERIES: u32 = 2 * Pass::ALL.len() as u32;
+
+/// The time that one pass took.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct PassTime {
+    /// Its name: that of its file in `shaders/pass`.
+    pub name: String,
+    /// Frames in which it ran and was timed.
+    pub frames: u64,
+    /// Mean per frame.
+    pub mean_ms: f64,
+    /// Longest.
+    pub max_ms: f64,
+}
+
+/// A clock for the passes of a frame. It is read after every frame, which then cannot overlap the next.
+#[derive(Debug)]
+pub(super) struct Timer {
+    queries: wgpu::QuerySet,
+    ticks: wgpu::Buffer,
+    ms_per_tick: f64,
+    /// The first frame is left out: some drivers compile in it.
+    is_first: bool,
+    times: [PassTime; Pass::ALL.len()],
+}
+
+impl Timer {
+    /// `None` where the device has no clock.
+    pub(super) fn new(gpu: &Gpu) -> Option<Self> {
+        if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return None;
+        }
+        Some(Self {
+            queries: gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("passes"),
+                ty: wgpu::QueryType::Timestamp,
+                count: QUERIES,
+            }),
+            ticks: gpu.device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some("timestamps"),
+                size: u64::from(QUERIES) * wgpu::QUERY_SIZE as u64,
+                usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+                mapped_at_creation: false,
+            }),
+            ms_per_tick: f64::from(gpu.queue.get_timestamp_period()) * 1e-6,
+            is_first: true,
+            times: Pass::ALL.map(|pass| PassTime {
+                name: pass.name().into(),
+                frames: 0,
+                mean_ms: 0.0,
+                max_ms: 0.0,
+            }),
+        })
+    }
+
+    /// Adds to the end of a frame what makes its times readable; `passes` ran, the first of [`Pass::ALL`].
+    pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder, passes: &[Pass]) {
+        encoder.resolve_query_set(&self.queries, 0..2 * passes.len() as u32, &self.ticks, 0);
+    }
+
+    /// Takes note of a frame in which `passes` ran, the first of [`Pass::ALL`].
+    pub(super) fn note(&mut self, gpu: &Gpu, passes: &[Pass]) {
+        let ticks: Option<Vec<u64>> = read(gpu, &self.ticks, bytemuck::pod_collect_to_vec);
+        let Some(ticks) = ticks else { return };
+        if std::mem::take(&mut self.is_first) {
+            return;
+        }
+        for (pass, ticks) in passes.iter().zip(ticks.chunks_exact(2)) {
+            let ms = ticks[1].saturating_sub(ticks[0]) as f64 * self.ms_per_tick;
+            let time = &mut self.times[*pass as usize];
+            time.frames += 1;
+            time.mean_ms += (ms - time.mean_ms) / time.frames as f64;
+            time.max_ms = time.max_ms.max(ms);
+        }
+    }
+
+    /// Of all passes that ran.
+    pub(super) fn times(&self) -> Vec<PassTime> {
+        self.times.iter().filter(|time| time.frames > 0).cloned().collect()
+    }
+}
