@@ -96,6 +96,9 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_enum, value_name = "EFFORT", num_args = 0..=1, require_equals = true, default_missing_value = "standard",
           conflicts_with_all = ["scenes", "samplers", "scenario", "reference"])]
     stress: Option<stress::Effort>,
+    /// With --stress: this program as it was built otherwise, such as without optimisation; its images have to be the same to the bit
+    #[arg(long, value_name = "PROGRAM", requires = "stress")]
+    other_build: Option<PathBuf>,
     /// Instead, measure what the renderer saves by leaving out what a scene does not need; exit code 1 if an image changes by it
     #[arg(long, conflicts_with_all = ["stress", "scenario", "reference", "vary"])]
     skips: bool,

@@ -8,6 +8,7 @@ use render::{Method, Settings, renderer};
 use sampling::Moments;
 use scene::{Camera, Scene, luminance};
 use serde::Serialize;
+use std::path::Path;
 
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -48,16 +49,18 @@ pub(super) const NEVER: (&str, f64) = ("occurrences", 0.0);
 pub(super) struct Bench<'w> {
     effort: Effort,
     watch: &'w Watch,
+    other_program: Option<&'w Path>,
     family: &'static str,
     checks: Vec<Check>,
 }
 
 impl<'w> Bench<'w> {
     /// None checked yet.
-    pub(super) fn new(effort: Effort, watch: &'w Watch) -> Self {
+    pub(super) fn new(effort: Effort, watch: &'w Watch, other_program: Option<&'w Path>) -> Self {
         Self {
             effort,
             watch,
+            other_program,
             family: "",
             checks: Vec::new(),
         }
@@ -80,6 +83,11 @@ impl<'w> Bench<'w> {
             Effort::Standard => standard,
             Effort::Long => long,
         }
+    }
+
+    /// This program as it was built otherwise, if there is one.
+    pub(super) fn other_program(&self) -> Option<&'w Path> {
+        self.other_program
     }
 
     /// Whether to stop.
