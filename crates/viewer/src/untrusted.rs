@@ -1,7 +1,8 @@
 //! Everything in this crate that takes bytes which others may have made, as functions for fuzzers: the folder `fuzz`, and the example `fuzz` of
 //! the package `tests`.
 //!
-//! None of them may panic, hang, or take memory out of proportion to what it is given.
+//! None of them may panic, hang, or take memory out of proportion to what it is given. Not among them is what a sampler has learned in a state that
+//! `render --resume` continues: its checksum finds all damage, but one who forges it can make the program end.
 
 use crate::camera_path::{self, Frames};
 use crate::cmd::render::parts::{self, Shard};
