@@ -18,7 +18,13 @@ const FRAMES: u32 = 6;
 
 /// Checks the family.
 pub(super) fn check(bench: &mut Bench) -> Result<()> {
-    gpu(bench)?;
+    if bench.pick(false, true, true) {
+        gpu(bench)?;
+    } else {
+        message::note(
+            "SKIPPED: the GPU is compared with the CPU at more effort only: software drivers compile its programs for minutes",
+        );
+    }
     match bench.other_program().map(Path::to_path_buf) {
         Some(program) => other(bench, &program),
         None => {
