@@ -4,6 +4,7 @@ use crate::interrupt::Watch;
 use anyhow::Result;
 use clap::ValueEnum;
 use glam::Vec3;
+use light_cache::SamplerKind;
 use render::{Method, Settings, renderer};
 use sampling::Moments;
 use scene::{Camera, Scene, luminance};
@@ -137,7 +138,7 @@ pub(super) struct Estimate {
     pub(super) mean: Moments,
     /// Luminance of each pixel.
     pub(super) pixels: Vec<Moments>,
-    /// Samples that were not finite, and pixels that are negative or no numbers.
+    /// Samples that were not finite, and pixels that are no numbers, or negative where they cannot be.
     pub(super) broken: u64,
 }
 
@@ -181,6 +182,9 @@ impl<'s> Shot<'s> {
             pixels: vec![Moments::default(); pixels],
             broken: 0,
         };
+        // A control variate takes away what is expected, which may be more than there is: by design, and only there.
+        let below_zero =
+            self.settings.method == Method::Sampled(SamplerKind::Adaptive) && self.settings.light.control_variate;
         for repetition in 0..self.repetitions {
             let settings = Settings {
                 seed: self.settings.seed + repetition,
@@ -193,7 +197,7 @@ impl<'s> Shot<'s> {
             estimate.broken += rendering.stats().nonfinite_samples;
             let mut sum = 0.0;
             for (moments, pixel) in estimate.pixels.iter_mut().zip(&rendering.film().image().pixels) {
-                estimate.broken += u64::from(!pixel.iter().all(|v| *v >= 0.0 && v.is_finite()));
+                estimate.broken += u64::from(!pixel.iter().all(|v| v.is_finite() && (below_zero || *v >= 0.0)));
                 let value = f64::from(luminance(Vec3::from_array(*pixel)));
                 moments.push(value);
                 sum += value;
