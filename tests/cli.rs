@@ -4,6 +4,7 @@ mod camera_paths;
 mod measuring;
 mod sampling;
 mod state;
+mod unlucky;
 
 use serde_json::{Value, json};
 use std::io::Read;

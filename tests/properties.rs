@@ -8,7 +8,7 @@ use sampling::statistics::{chi_square_p, pooled_chi_square};
 use scene::surface::NO_LIGHT;
 use scene::{Camera, Material, PrimitiveId, Ray, Scene, SceneParts};
 use tests::compare::{Case, Plan, assert_same, disagreement, image, sampled};
-use tests::scenes::{Builder, ground, meter, point, still_life, still_life_camera, still_life_with};
+use tests::scenes::{Builder, ground, meter, point, square_lamp, still_life, still_life_camera};
 
 fn still_life_plan(seed: u64) -> Plan {
     Plan::new(sampled(SamplerKind::Tree), 24, 18)
@@ -20,7 +20,7 @@ fn still_life_plan(seed: u64) -> Plan {
 /// Asserts that `scene` seen by `camera` looks like the still life.
 fn assert_looks_like_still_life(what: &str, scene: &Scene, camera: &Camera) {
     let (original, its_camera) = (
-        still_life(1.0).build().expect("the scene is valid"),
+        still_life(1.0, square_lamp(1.0)).build().expect("the scene is valid"),
         still_life_camera(1.0),
     );
     let original = Case::new(&original, &its_camera, still_life_plan(0)).measure();
@@ -31,10 +31,10 @@ fn assert_looks_like_still_life(what: &str, scene: &Scene, camera: &Camera) {
 #[test]
 fn a_dimmer_lamp_is_noticed() {
     let (original, camera) = (
-        still_life(1.0).build().expect("the scene is valid"),
+        still_life(1.0, square_lamp(1.0)).build().expect("the scene is valid"),
         still_life_camera(1.0),
     );
-    let mut parts = still_life(1.0).parts();
+    let mut parts = still_life(1.0, square_lamp(1.0)).parts();
     parts.punctual[0].0.intensity *= 0.9;
     let dimmer = Scene::new(parts).expect("the scene is valid");
     let [a, b] = [(&original, 0), (&dimmer, 1000)]
@@ -44,7 +44,7 @@ fn a_dimmer_lamp_is_noticed() {
 
 #[test]
 fn the_order_of_lights_does_not_matter() {
-    let mut parts = still_life(1.0).parts();
+    let mut parts = still_life(1.0, square_lamp(1.0)).parts();
     parts.punctual.reverse();
     let mesh = &mut parts.meshes[0];
     mesh.indices.reverse();
@@ -55,7 +55,7 @@ fn the_order_of_lights_does_not_matter() {
 
 #[test]
 fn a_lamp_cut_in_four_shines_alike() {
-    let cut = still_life_with(1.0, |builder, material| {
+    let cut = still_life(1.0, |builder, material| {
         for (x, z) in [(0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5)] {
             builder.quad(Vec3::new(x - 1.0, 3.0, z - 1.0), Vec3::X * 0.5, Vec3::Z * 0.5, material);
         }
@@ -63,7 +63,12 @@ fn a_lamp_cut_in_four_shines_alike() {
     let cut = cut.build().expect("the scene is valid");
     assert_eq!(
         cut.lights.len(),
-        still_life(1.0).build().expect("the scene is valid").lights.len() + 6
+        still_life(1.0, square_lamp(1.0))
+            .build()
+            .expect("the scene is valid")
+            .lights
+            .len()
+            + 6
     );
     assert_looks_like_still_life("lamp in four", &cut, &still_life_camera(1.0));
 }
@@ -71,7 +76,9 @@ fn a_lamp_cut_in_four_shines_alike() {
 #[test]
 fn the_unit_of_length_does_not_matter() {
     for scale in [1e-3, 1e4] {
-        let scaled = still_life(scale).build().expect("the scene is valid");
+        let scaled = still_life(scale, square_lamp(scale))
+            .build()
+            .expect("the scene is valid");
         assert_looks_like_still_life(&format!("scaled by {scale}"), &scaled, &still_life_camera(scale));
     }
 }
@@ -263,7 +270,7 @@ fn probabilities_are_what_is_drawn() {
     }
     check_probabilities(
         "still life",
-        &still_life(1.0).build().expect("the scene is valid"),
+        &still_life(1.0, square_lamp(1.0)).build().expect("the scene is valid"),
         &still_life_camera(1.0),
     );
 }

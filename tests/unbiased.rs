@@ -5,7 +5,7 @@
 use light_cache::SamplerKind;
 use render::Method;
 use tests::compare::{Case, Plan, assert_same, sampled};
-use tests::scenes::{still_life, still_life_camera};
+use tests::scenes::{square_lamp, still_life, still_life_camera};
 
 const WIDTH: u32 = 32;
 const HEIGHT: u32 = 24;
@@ -88,7 +88,7 @@ fn one_light() {
 fn lights_of_every_kind() {
     check_scene(
         "still life",
-        &still_life(1.0).build().expect("the scene is valid"),
+        &still_life(1.0, square_lamp(1.0)).build().expect("the scene is valid"),
         &still_life_camera(1.0),
     );
 }

@@ -17,10 +17,10 @@ pub trait Visitor {
 }
 
 /// Builds the sampler of the given kind for `scene` and hands it to `visitor`. A scene with one light or none needs no
-/// choice: the visitor gets a [`UniformSampler`], which says so in its [`crate::SamplerStats::skipped`].
+/// choice: the visitor gets a [`UniformSampler`], which says so in its [`crate::SamplerStats::skipped`], unless [`Settings::choose_among_one`].
 pub fn build<V: Visitor>(scene: &Scene, settings: &Settings, kind: SamplerKind, visitor: V) -> V::Output {
     let lights = &scene.lights;
-    if lights.len() < 2 {
+    if lights.is_empty() || lights.len() == 1 && !settings.choose_among_one {
         return visitor.visit(UniformSampler::new(lights));
     }
     match kind {

@@ -68,6 +68,9 @@ pub struct Settings {
     /// `octree`: lights with a probability of their own in each cell. Higher values leave less to the rest that is
     /// drawn by power; lower values fill cells faster. 64.
     pub octree_bright: u32,
+    /// To measure what leaving it out saves: whether the sampler is made, asked and taught where there is one light only. Off.
+    #[serde(default)]
+    pub choose_among_one: bool,
 }
 
 impl Default for Settings {
@@ -79,6 +82,7 @@ impl Default for Settings {
             control_variate: true,
             octree_depth: 5,
             octree_bright: 64,
+            choose_among_one: false,
         }
     }
 }

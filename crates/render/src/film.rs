@@ -5,6 +5,8 @@
 //!
 //! A tile owns its pixels, so tiles are rendered in parallel without sharing, and a sample touches one cache line or two.
 
+mod sound;
+
 use crate::RenderError;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -170,14 +172,23 @@ pub struct Film {
     tiles: Vec<Tile>,
 }
 
+/// Left column and top row of each tile of a film.
+fn corners(width: u32, height: u32) -> impl Iterator<Item = (u32, u32)> {
+    let starts = |end: u32| (0..end).step_by(TILE_SIZE as usize);
+    starts(height).flat_map(move |y0| starts(width).map(move |x0| (x0, y0)))
+}
+
+/// Columns and rows of the tile that begins at (`x0`, `y0`).
+fn tile_size(width: u32, height: u32, x0: u32, y0: u32) -> (u32, u32) {
+    (TILE_SIZE.min(width - x0), TILE_SIZE.min(height - y0))
+}
+
 impl Film {
     /// An empty film; with `aovs`, auxiliary images are kept too.
     pub fn new(width: u32, height: u32, aovs: bool) -> Self {
-        let starts = |end: u32| (0..end).step_by(TILE_SIZE as usize);
-        let tiles = starts(height)
-            .flat_map(|y0| starts(width).map(move |x0| (x0, y0)))
+        let tiles = corners(width, height)
             .map(|(x0, y0)| {
-                let (w, h) = (TILE_SIZE.min(width - x0), TILE_SIZE.min(height - y0));
+                let (w, h) = tile_size(width, height, x0, y0);
                 let len = (w * h) as usize;
                 Tile {
                     x0,
@@ -263,13 +274,13 @@ impl Film {
                 what: "films of different sizes or layers cannot be joined".into(),
             });
         }
-        self.frames += other.frames;
+        self.frames = self.frames.saturating_add(other.frames);
         for (weight, others) in self.weights.iter_mut().zip(other.weights) {
             *weight += others;
         }
         for (tile, others) in self.tiles.iter_mut().zip(&other.tiles) {
             for (pixel, other) in tile.pixels.iter_mut().zip(&others.pixels) {
-                pixel.count += other.count;
+                pixel.count = pixel.count.saturating_add(other.count);
                 pixel.weight += other.weight;
                 pixel
                     .sums
@@ -278,8 +289,8 @@ impl Film {
                     .for_each(|(sum, other)| *sum += other);
             }
             for (pixel, other) in tile.aovs.iter_mut().zip(&others.aovs) {
-                pixel.count += other.count;
-                pixel.hits += other.hits;
+                pixel.count = pixel.count.saturating_add(other.count);
+                pixel.hits = pixel.hits.saturating_add(other.hits);
                 pixel.light = other.light;
                 pixel
                     .sums

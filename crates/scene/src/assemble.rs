@@ -1,5 +1,9 @@
 //! Scenes put together by hand, triangle by triangle: for tests, and for scenes whose image is known in closed form.
 
+mod still_life;
+
+pub use still_life::{square_lamp, still_life, still_life_camera};
+
 use crate::{
     Instance, Light, LightKind, LightSource, Material, Mesh, PrimitiveId, Scene, SceneError, SceneParts, luminance,
 };

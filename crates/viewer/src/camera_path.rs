@@ -55,13 +55,21 @@ impl Pose {
 pub(crate) fn read(path: &Path) -> anyhow::Result<Vec<Camera>> {
     let shown = path.display();
     let text = std::fs::read_to_string(path).with_context(|| format!("{shown}: cannot read the camera path"))?;
-    let poses: Vec<Pose> = serde_json::from_str(&text)
-        .with_context(|| format!("{shown}: no camera path; the window records one, see its key K"))?;
+    parse(&text).with_context(|| shown.to_string())
+}
+
+/// Understands a text.
+///
+/// # Errors
+/// If it is no camera path.
+pub(crate) fn parse(text: &str) -> anyhow::Result<Vec<Camera>> {
+    let poses: Vec<Pose> =
+        serde_json::from_str(text).context("no camera path; the window records one, see its key K")?;
     if poses.is_empty() {
-        bail!("{shown}: the camera path has no frames");
+        bail!("the camera path has no frames");
     }
     let cameras: Option<Vec<Camera>> = poses.iter().map(|pose| pose.camera("path")).collect();
-    cameras.with_context(|| format!("{shown}: a pose is no rotation, or its angle of view is not between 0 and pi"))
+    cameras.context("a pose is no rotation, or its angle of view is not between 0 and pi")
 }
 
 /// Writes a camera path.

@@ -24,7 +24,20 @@ pub(crate) fn install() -> Result<()> {
         WRITING => {}
         _ => std::process::exit(130),
     })
-    .context("cannot watch for Ctrl-C")
+    .context("cannot watch for Ctrl-C")?;
+    survive_file_size_limits()
+}
+
+/// A file that grows beyond the limit of the shell (`ulimit -f`) is to be an error like a full disk, not the end of the process.
+fn survive_file_size_limits() -> Result<()> {
+    #[cfg(unix)]
+    {
+        use signal_hook::{consts::SIGXFSZ, flag};
+        use std::sync::{Arc, atomic::AtomicBool};
+        // Whether it came is of no interest: the write that caused it fails.
+        flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).context("cannot watch for limits of file sizes")?;
+    }
+    Ok(())
 }
 
 /// While it lives, a signal asks to stop and does not end the program.

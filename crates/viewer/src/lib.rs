@@ -21,6 +21,7 @@ mod progress;
 mod session;
 mod table;
 mod tev;
+pub mod untrusted;
 mod view;
 
 use clap::Parser;

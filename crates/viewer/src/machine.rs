@@ -58,6 +58,19 @@ pub(crate) fn available_memory_bytes() -> Option<u64> {
     proc_field("/proc/meminfo", "MemAvailable:")
 }
 
+/// Seconds for which all threads of the process together have had a processor, where the system tells.
+pub(crate) fn processor_s() -> Option<f64> {
+    let mut nanoseconds = 0_u64;
+    for thread in std::fs::read_dir("/proc/self/task").ok()? {
+        // Threads that have ended in between have had their time before.
+        let Ok(text) = std::fs::read_to_string(thread.ok()?.path().join("schedstat")) else {
+            continue;
+        };
+        nanoseconds += text.split_whitespace().next()?.parse::<u64>().ok()?;
+    }
+    Some(nanoseconds as f64 * 1e-9)
+}
+
 /// A field in kB of one of Linux's text files, in bytes.
 fn proc_field(path: &str, field: &str) -> Option<u64> {
     let text = std::fs::read_to_string(path).ok()?;

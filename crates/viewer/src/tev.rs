@@ -98,12 +98,10 @@ fn open(address: &str) -> std::io::Result<TcpStream> {
 
 fn send_all(mut stream: TcpStream, title: &str, images: &Receiver<Image>) {
     for image in images {
-        for y in (0..image.height).step_by(TILE as usize) {
-            for x in (0..image.width).step_by(TILE as usize) {
-                if let Err(error) = stream.write_all(&tile_packet(title, &image, x, y)) {
-                    message::warn(format!("the display server has gone: {error}; rendering goes on"));
-                    return;
-                }
+        for (x, y) in corners(&image) {
+            if let Err(error) = stream.write_all(&tile_packet(title, &image, x, y)) {
+                message::warn(format!("the display server has gone: {error}; rendering goes on"));
+                return;
             }
         }
     }
@@ -138,6 +136,20 @@ impl Packet {
         self.0[..4].copy_from_slice(&length.to_le_bytes());
         self.0
     }
+}
+
+/// The packets that create an image of this title and show its pixels, each with its length ahead.
+pub(crate) fn packets(title: &str, image: &Image) -> Vec<Vec<u8>> {
+    let mut packets = vec![create_packet(title, image.width, image.height)];
+    packets.extend(corners(image).map(|(x, y)| tile_packet(title, image, x, y)));
+    packets
+}
+
+/// Left column and top row of each tile.
+fn corners(image: &Image) -> impl Iterator<Item = (u32, u32)> + use<> {
+    let (width, height) = (image.width, image.height);
+    let rows = (0..height).step_by(TILE as usize);
+    rows.flat_map(move |y| (0..width).step_by(TILE as usize).map(move |x| (x, y)))
 }
 
 fn create_packet(title: &str, width: u32, height: u32) -> Vec<u8> {

@@ -25,7 +25,12 @@ impl State<'_> {
     }
 
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self, RenderError> {
-        postcard::from_bytes(bytes).map_err(|_| unlike())
+        let state: Self = postcard::from_bytes(bytes).map_err(|_| unlike())?;
+        if state.film.is_sound() {
+            Ok(state)
+        } else {
+            Err(unlike())
+        }
     }
 }
 

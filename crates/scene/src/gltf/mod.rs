@@ -80,6 +80,7 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     }
     parts.punctual = lights::read(&source, &placed, &mut report)?;
     parts.cameras = cameras::read(&source, &placed, &parts, &bounds, &mut report)?;
+    source.check_unchanged()?;
     parts.report = report;
     remark(&mut parts);
     Ok(parts)

@@ -2,9 +2,11 @@
 
 use super::json::{self, Index, Root, View};
 use crate::SceneError;
-use std::fs::File;
+use std::fs::{File, Metadata};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
 
 /// A glTF file with its JSON parsed and its buffers read.
 #[derive(Debug)]
@@ -17,6 +19,34 @@ pub(super) struct Source {
     buffers: Vec<Option<Vec<u8>>>,
     /// Bytes read so far: what the sizes of everything made from the file are measured by.
     pub(super) bytes: u64,
+    /// All files read so far, as they were then.
+    seen: Mutex<Vec<Seen>>,
+}
+
+/// A file as it was when it was read.
+#[derive(Debug)]
+struct Seen {
+    path: PathBuf,
+    len: u64,
+    /// Where the system tells.
+    modified: Option<SystemTime>,
+}
+
+impl Seen {
+    fn new(path: &Path, metadata: &Metadata) -> Self {
+        Self {
+            path: path.into(),
+            len: metadata.len(),
+            modified: metadata.modified().ok(),
+        }
+    }
+
+    /// Whether the file is no longer what it was.
+    fn has_changed(&self) -> bool {
+        self.path.metadata().map_or(true, |now| {
+            now.len() != self.len || now.modified().ok() != self.modified
+        })
+    }
 }
 
 impl Source {
@@ -26,7 +56,7 @@ impl Source {
     /// [`SceneError::Read`] for a missing file or buffer, [`SceneError::Invalid`] for what is not glTF 2.0 or requires an
     /// unsupported extension.
     pub(super) fn open(path: &Path) -> Result<Self, SceneError> {
-        let file = read_file(path, path, "scene")?;
+        let (file, seen) = read_file(path, path, "scene")?;
         let bytes = file.len() as u64;
         let (text, blob) = split(path, &file)?;
         // A byte order mark is not allowed, but some editors leave one.
@@ -44,6 +74,7 @@ impl Source {
             json,
             buffers: Vec::new(),
             bytes,
+            seen: Mutex::new(vec![seen]),
         };
         source.check_version()?;
         // First, because extensions for compression leave buffers out.
@@ -137,7 +168,25 @@ impl Source {
             ));
         }
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        read_file(&self.path, &folder.join(relative), what)
+        let (bytes, seen) = read_file(&self.path, &folder.join(relative), what)?;
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).push(seen);
+        Ok(bytes)
+    }
+
+    /// Makes sure that everything was read from the same state of the files.
+    ///
+    /// # Errors
+    /// [`SceneError::Invalid`] for one that has been replaced or changed since it was read: it need not fit the others.
+    pub(super) fn check_unchanged(&self) -> Result<(), SceneError> {
+        let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        match seen.iter().find(|file| file.has_changed()) {
+            None => Ok(()),
+            Some(file) => Err(self.invalid(
+                file.path.display().to_string(),
+                "was changed while the scene was loading",
+                "load it again once it is written",
+            )),
+        }
     }
 
     fn check_version(&self) -> Result<(), SceneError> {
@@ -192,7 +241,7 @@ fn invalid(path: &Path, place: impl Into<String>, problem: impl Into<String>, re
 
 /// Reads `file`; errors about a part name `scene` too. Only regular files: a URI must not make us wait for a pipe or
 /// read a device without end.
-fn read_file(scene: &Path, file: &Path, what: &str) -> Result<Vec<u8>, SceneError> {
+fn read_file(scene: &Path, file: &Path, what: &str) -> Result<(Vec<u8>, Seen), SceneError> {
     let error = |source: std::io::Error| SceneError::Read {
         path: file.into(),
         what: if scene == file {
@@ -206,11 +255,15 @@ fn read_file(scene: &Path, file: &Path, what: &str) -> Result<Vec<u8>, SceneErro
     if !metadata.is_file() {
         return Err(error(std::io::Error::other("not a regular file")));
     }
-    let mut bytes = Vec::new();
-    File::open(file)
-        .and_then(|mut f| f.read_to_end(&mut bytes))
-        .map_err(error)?;
-    Ok(bytes)
+    // Of the file that is opened, which may be another by now.
+    let read = || {
+        let mut opened = File::open(file)?;
+        let seen = Seen::new(file, &opened.metadata()?);
+        let mut bytes = Vec::new();
+        opened.read_to_end(&mut bytes)?;
+        Ok((bytes, seen))
+    };
+    read().map_err(error)
 }
 
 /// Splits a file into JSON and binary chunk (glTF 2.0 section 4.4); a file without the magic number is all JSON.
@@ -326,6 +379,26 @@ mod tests {
         assert_eq!(decode_base64(b"Zm9v\nYmFy").unwrap(), b"foobar");
         assert_eq!(decode_base64(b"_-8").unwrap(), decode_base64(b"/+8=").unwrap());
         assert!(decode_base64(b"Zm9v!").is_none());
+    }
+
+    #[test]
+    fn files_that_change_meanwhile_are_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let json = r#"{ "asset": { "version": "2.0" }, "buffers": [{ "byteLength": 4, "uri": "a.bin" }] }"#;
+        std::fs::write(at("a.gltf"), json).unwrap();
+        std::fs::write(at("a.bin"), "1234").unwrap();
+        for name in ["a.bin", "a.gltf"] {
+            let source = Source::open(&at("a.gltf")).unwrap();
+            source.check_unchanged().unwrap();
+            let longer = std::fs::read_to_string(at(name)).unwrap() + " ";
+            std::fs::write(at(name), longer).unwrap();
+            let error = source.check_unchanged().unwrap_err().to_string();
+            assert!(error.contains(name) && error.contains("changed"), "{error}");
+        }
+        let source = Source::open(&at("a.gltf")).unwrap();
+        std::fs::remove_file(at("a.bin")).unwrap();
+        assert!(source.check_unchanged().is_err());
     }
 
     #[test]

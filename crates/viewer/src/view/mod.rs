@@ -17,8 +17,8 @@ mod picture_pass;
 mod places;
 mod renderer;
 mod resolution;
-mod script;
-mod settings_file;
+pub(crate) mod script;
+pub(crate) mod settings_file;
 mod views;
 
 use crate::camera_path;

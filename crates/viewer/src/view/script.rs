@@ -51,7 +51,7 @@ pub(super) enum Step {
 
 /// A script, and how far it has come.
 #[derive(Clone, Debug)]
-pub(super) struct Script {
+pub(crate) struct Script {
     steps: VecDeque<(u64, Step)>,
     /// Frames so far. Stands still while something is waited for.
     frame: u64,
@@ -72,7 +72,7 @@ impl Script {
     ///
     /// # Errors
     /// The first line that is not understood, with its number.
-    pub(super) fn parse(text: &str) -> Result<Self> {
+    pub(crate) fn parse(text: &str) -> Result<Self> {
         let mut steps = VecDeque::new();
         for (number, line) in (1..).zip(text.lines()) {
             let line = line.split('#').next().unwrap_or_default();

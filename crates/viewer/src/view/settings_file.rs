@@ -13,7 +13,7 @@ const RECENT: usize = 8;
 /// What is remembered. Anything missing or unknown in the file is as at the first run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub(super) struct Remembered {
+pub(crate) struct Remembered {
     /// Scenes that were open, the last one first.
     pub(super) recent: Vec<String>,
     /// Whether the figures are shown.
@@ -42,8 +42,17 @@ impl Remembered {
     /// Reads the file; what was never written or cannot be understood is as at the first run.
     pub(super) fn read() -> Self {
         let text = path().and_then(|path| std::fs::read_to_string(path).ok());
-        text.and_then(|text| serde_json::from_str(&text).ok())
-            .unwrap_or_default()
+        text.and_then(|text| Self::parse(&text)).unwrap_or_default()
+    }
+
+    /// Understands a text, if it can be understood.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        serde_json::from_str(text).ok()
+    }
+
+    /// All bookmarks of all scenes.
+    pub(crate) fn bookmarks(&self) -> impl Iterator<Item = &Pose> {
+        self.bookmarks.values().flat_map(BTreeMap::values)
     }
 
     /// Writes the file.

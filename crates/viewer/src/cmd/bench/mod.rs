@@ -6,6 +6,7 @@ mod reference;
 mod report;
 mod run;
 mod scenario;
+mod skips;
 mod stress;
 mod summary;
 
@@ -39,6 +40,7 @@ Examples:
   manylight bench demo:rooms --samplers tree,adaptive --backend cpu,gpu --pass-times      what does the GPU gain?
   manylight bench hall.glb --seeds 5 --max-bounces 2 -o hall-bench
   manylight bench --stress -o stress-out                       is anything wrong at the limits?
+  manylight bench --skips demo:rooms -o skips-out              what does it save to leave out what a scene does not need?
 
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
 measuring is not counted as time, building the light structures and learning are. The runs of a scene take turns frame
@@ -99,6 +101,12 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_enum, value_name = "EFFORT", num_args = 0..=1, require_equals = true, default_missing_value = "standard",
           conflicts_with_all = ["scenes", "samplers", "scenario", "reference"])]
     stress: Option<stress::Effort>,
+    /// With --stress: this program as it was built otherwise, such as without optimisation; its images have to be the same to the bit
+    #[arg(long, value_name = "PROGRAM", requires = "stress")]
+    other_build: Option<PathBuf>,
+    /// Instead, measure what the renderer saves by leaving out what a scene does not need; exit code 1 if an image changes by it
+    #[arg(long, conflicts_with_all = ["stress", "scenario", "reference", "vary"])]
+    skips: bool,
     /// Folder for the results
     #[arg(short, long, value_name = "DIR", default_value = "bench-out")]
     output: PathBuf,
@@ -123,6 +131,9 @@ fn frame_count(text: &str) -> Result<usize, String> {
 pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     if let Some(effort) = args.stress {
         return stress::run(args, effort);
+    }
+    if args.skips {
+        return skips::run(args);
     }
     let methods: Vec<Method> = match args.samplers.as_slice() {
         [] => SamplerKind::ALL.map(Method::Sampled).to_vec(),

@@ -105,10 +105,17 @@ impl Header {
 pub(crate) fn write(path: &Path, header: &Header, frames: &dyn FrameLoop<'_>) -> Result<()> {
     let header = serde_json::to_vec(header)?;
     let length = u32::try_from(header.len()).context("the header is too long")?;
-    let mut bytes = [MAGIC, &length.to_le_bytes(), &header].concat();
-    bytes.extend(frames.save()?);
+    output::write(
+        path,
+        &sealed(&[&length.to_le_bytes()[..], &header, &frames.save()?].concat()),
+    )
+}
+
+/// A file's bytes from what is in it: with what it begins with, and the checksum.
+pub(crate) fn sealed(body: &[u8]) -> Vec<u8> {
+    let mut bytes = [MAGIC, body].concat();
     bytes.extend(fnv(&bytes).to_le_bytes());
-    output::write(path, &bytes)
+    bytes
 }
 
 /// Reads what [`write`] has written: whose state, and the state.
@@ -120,7 +127,11 @@ pub(crate) fn read(path: &Path) -> Result<(Header, Vec<u8>)> {
     parse(&bytes).with_context(|| format!("{}: cannot be used", path.display()))
 }
 
-fn parse(bytes: &[u8]) -> Result<(Header, Vec<u8>)> {
+/// Understands the bytes of a file.
+///
+/// # Errors
+/// Bytes that are damaged, or something else.
+pub(crate) fn parse(bytes: &[u8]) -> Result<(Header, Vec<u8>)> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
         bail!("no state of a rendering by this version; write one with --resume, or with -o NAME.part");
     };
@@ -198,8 +209,7 @@ mod tests {
 
     #[test]
     fn damaged_files_are_refused() {
-        let mut bytes = [MAGIC, &2_u32.to_le_bytes(), b"{}", b"state"].concat();
-        bytes.extend(fnv(&bytes).to_le_bytes());
+        let bytes = sealed(&[&2_u32.to_le_bytes()[..], b"{}", b"state"].concat());
         for length in 0..bytes.len() {
             assert!(parse(&bytes[..length]).is_err());
         }

@@ -4,10 +4,12 @@ use crate::interrupt::Watch;
 use anyhow::Result;
 use clap::ValueEnum;
 use glam::Vec3;
+use light_cache::SamplerKind;
 use render::{Method, Settings, renderer};
 use sampling::Moments;
 use scene::{Camera, Scene, luminance};
 use serde::Serialize;
+use std::path::Path;
 
 /// How much is done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -48,16 +50,18 @@ pub(super) const NEVER: (&str, f64) = ("occurrences", 0.0);
 pub(super) struct Bench<'w> {
     effort: Effort,
     watch: &'w Watch,
+    other_program: Option<&'w Path>,
     family: &'static str,
     checks: Vec<Check>,
 }
 
 impl<'w> Bench<'w> {
     /// None checked yet.
-    pub(super) fn new(effort: Effort, watch: &'w Watch) -> Self {
+    pub(super) fn new(effort: Effort, watch: &'w Watch, other_program: Option<&'w Path>) -> Self {
         Self {
             effort,
             watch,
+            other_program,
             family: "",
             checks: Vec::new(),
         }
@@ -80,6 +84,11 @@ impl<'w> Bench<'w> {
             Effort::Standard => standard,
             Effort::Long => long,
         }
+    }
+
+    /// This program as it was built otherwise, if there is one.
+    pub(super) fn other_program(&self) -> Option<&'w Path> {
+        self.other_program
     }
 
     /// Whether to stop.
@@ -129,7 +138,7 @@ pub(super) struct Estimate {
     pub(super) mean: Moments,
     /// Luminance of each pixel.
     pub(super) pixels: Vec<Moments>,
-    /// Samples that were not finite, and pixels that are negative or no numbers.
+    /// Samples that were not finite, and pixels that are no numbers, or negative where they cannot be.
     pub(super) broken: u64,
 }
 
@@ -173,6 +182,9 @@ impl<'s> Shot<'s> {
             pixels: vec![Moments::default(); pixels],
             broken: 0,
         };
+        // A control variate takes away what is expected, which may be more than there is: by design, and only there.
+        let below_zero =
+            self.settings.method == Method::Sampled(SamplerKind::Adaptive) && self.settings.light.control_variate;
         for repetition in 0..self.repetitions {
             let settings = Settings {
                 seed: self.settings.seed + repetition,
@@ -185,7 +197,7 @@ impl<'s> Shot<'s> {
             estimate.broken += rendering.stats().nonfinite_samples;
             let mut sum = 0.0;
             for (moments, pixel) in estimate.pixels.iter_mut().zip(&rendering.film().image().pixels) {
-                estimate.broken += u64::from(!pixel.iter().all(|v| *v >= 0.0 && v.is_finite()));
+                estimate.broken += u64::from(!pixel.iter().all(|v| v.is_finite() && (below_zero || *v >= 0.0)));
                 let value = f64::from(luminance(Vec3::from_array(*pixel)));
                 moments.push(value);
                 sum += value;

@@ -1,6 +1,7 @@
 //! `bench --stress`: inputs that break renderers, each with an answer that is known in closed form or in double precision.
 
 mod bench;
+mod builds;
 mod choice;
 mod emission;
 mod invariance;
@@ -25,7 +26,7 @@ use std::time::Instant;
 /// A family of hazards: its name, and what checks it.
 type Family = (&'static str, fn(&mut Bench) -> Result<()>);
 
-const FAMILIES: [Family; 9] = [
+const FAMILIES: [Family; 10] = [
     ("emission", emission::check),
     ("places", places::check),
     ("leaks", leaks::check),
@@ -35,6 +36,7 @@ const FAMILIES: [Family; 9] = [
     ("sums", sums::check),
     ("numbers", numbers::check),
     ("invariance", invariance::check),
+    ("builds", builds::check),
 ];
 
 /// Checks all hazards.
@@ -45,7 +47,7 @@ pub(super) fn run(args: &BenchArgs, effort: Effort) -> Result<Status> {
     super::make_output(&args.output, "stress.json")?;
     session::use_threads(args.light.threads)?;
     let watch = Watch::rendering();
-    let mut bench = Bench::new(effort, &watch);
+    let mut bench = Bench::new(effort, &watch, args.other_build.as_deref());
     for (family, check) in FAMILIES {
         let start = Instant::now();
         bench.begin(family);

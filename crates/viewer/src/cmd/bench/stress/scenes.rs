@@ -4,7 +4,7 @@ use anyhow::Result;
 use glam::{Affine3A, DVec3, Vec3};
 use light_cache::SamplerKind;
 use render::Method;
-use scene::assemble::{Builder, directional, point, spot};
+use scene::assemble::{self, Builder};
 use scene::{Camera, LightKind, Material, Scene, SceneParts};
 
 /// The samplers that guarantee every light a probability, so that even a light that nothing points to is drawn in time.
@@ -59,44 +59,17 @@ pub(super) fn furnaces(radiances: &[Vec3]) -> Result<(Scene, Vec<Camera>)> {
     Ok((builder.build()?, cameras))
 }
 
-/// A table with things on it under lamps of all kinds; `lamp` makes a square one facing down, a metre wide at 3 m, from its material.
+/// [`assemble::still_life`] and its camera.
 pub(super) fn still_life(lamp: impl FnOnce(&mut Builder, u32)) -> (SceneParts, Camera) {
-    let mut builder = Builder::default();
-    let grey = builder.material(Material::lambert("grey", Vec3::splat(0.6)));
-    let red = builder.material(Material::lambert("red", Vec3::new(0.7, 0.2, 0.1)));
-    let glossy = builder.material(Material {
-        roughness: 0.4,
-        dielectric_f0: Vec3::splat(0.04),
-        dielectric_f90: 1.0,
-        ..Material::lambert("glossy", Vec3::new(0.2, 0.3, 0.6))
-    });
-    let warm = builder.material(Material::emitter("warm", Vec3::new(5.0, 4.0, 3.0)));
-    let strip = builder.material(Material::emitter("strip", Vec3::new(0.5, 1.0, 2.0)));
-    builder.quad(Vec3::new(-4.0, 0.0, -4.0), Vec3::Z * 8.0, Vec3::X * 8.0, grey);
-    builder.quad(Vec3::new(-4.0, 0.0, -2.0), Vec3::X * 8.0, Vec3::Y * 4.0, glossy);
-    builder.quad(Vec3::Y, Vec3::Z, Vec3::X, red);
-    builder.quad(Vec3::Z, Vec3::X, Vec3::Y, red);
-    builder.quad(Vec3::ZERO, Vec3::Z, Vec3::Y, red);
-    builder.quad(Vec3::new(2.0, 0.25, -1.75), Vec3::X * 1.5, Vec3::Y * 0.25, strip);
-    lamp(&mut builder, warm);
-    builder.light(point(Vec3::new(2.0, 1.5, 1.0), Vec3::new(1.0, 0.8, 0.6)));
-    builder.light(point(Vec3::new(-2.5, 0.75, 0.5), Vec3::new(0.2, 0.3, 0.2)));
-    let downwards = Vec3::new(0.0, -0.8, -0.6);
-    builder.light(spot(Vec3::new(0.5, 3.5, 2.0), downwards, Vec3::splat(6.0), 0.2, 0.5));
-    builder.light(directional(Vec3::new(0.6, -0.64, -0.48), Vec3::new(0.1, 0.1, 0.2)));
-    let camera = Camera::look_at(
-        "still life",
-        Vec3::new(1.0, 2.5, 6.0),
-        Vec3::new(0.25, 0.75, 0.0),
-        Vec3::Y,
-        0.8,
-    );
-    (builder.parts(), camera)
+    (
+        assemble::still_life(1.0, lamp).parts(),
+        assemble::still_life_camera(1.0),
+    )
 }
 
-/// [`still_life`]'s lamp in one piece.
+/// Its lamp in one piece.
 pub(super) fn square_lamp(builder: &mut Builder, material: u32) {
-    builder.quad(Vec3::new(-1.0, 3.0, -1.0), Vec3::X, Vec3::Z, material);
+    assemble::square_lamp(1.0)(builder, material);
 }
 
 /// The same scene with all lengths times `scale` and then moved by `offset`, as nodes of files move meshes; radiance kept: a picture of it is the same.
