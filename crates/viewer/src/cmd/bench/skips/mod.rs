@@ -7,11 +7,11 @@ mod needless;
 mod report;
 
 use super::BenchArgs;
-use crate::cli::LightArgs;
+use crate::cli::{Backend, LightArgs};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::{machine, message, output, session};
-use anyhow::Result;
+use anyhow::{Result, bail};
 use glam::Vec3;
 use needless::Skip;
 use render::{FrameLoop, Method, Settings};
@@ -62,6 +62,9 @@ struct Line {
 /// # Errors
 /// Bad input; files that cannot be written.
 pub(super) fn run(args: &BenchArgs) -> Result<Status> {
+    if args.light.one_backend()? != Backend::Cpu {
+        bail!("--skips renders on the CPU only; leave --backend away");
+    }
     super::make_output(&args.output, "skips.json")?;
     session::use_threads(args.light.threads)?;
     let scenes = match args.scenes.as_slice() {
@@ -108,7 +111,7 @@ pub(super) fn run(args: &BenchArgs) -> Result<Status> {
 }
 
 fn settings(args: &LightArgs, method: Method, size: (u32, u32)) -> Result<Settings> {
-    let settings = args.settings(method, size)?;
+    let settings = args.settings(method, size);
     settings.check()?;
     Ok(settings)
 }

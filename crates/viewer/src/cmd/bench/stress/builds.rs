@@ -52,15 +52,13 @@ fn gpu(bench: &mut Bench) -> Result<()> {
         SamplerKind::Table,
         SamplerKind::Adaptive,
     ] {
-        let mut settings = Settings {
+        let settings = Settings {
             width: 48,
             height: 36,
             method: Method::Sampled(kind),
             max_bounces: 1,
             ..Settings::default()
         };
-        // The GPU draws without one.
-        settings.light.control_variate = false;
         let of_cpu = picture(render::renderer(&scene, &camera, &settings)?.as_mut());
         let of_gpu = picture(render::gpu::renderer(&gpu, &scene, &camera, &settings)?.as_mut());
         let error = ImageError::between(&of_gpu, &of_cpu).map_or(f64::NAN, |error| error.relmse);
