@@ -8,6 +8,10 @@
 //! The Koksma-Hlawka inequality bounds the error of a mean by `D*` times the variation of the integrand, so it says what points can
 //! do for every integrand at once: `N^(-1/2)` for independent points, `N^(-1) log N` for the best in 2-D.
 //!
+//! <div>
+#![doc = include_str!("../../../docs/monte-carlo/discrepancy.svg")]
+//! </div>
+//!
 //! ```
 //! use sampling::{discrepancy, points::PointSet};
 //! let of = |set: PointSet| discrepancy::star_2d(&set.points(256, 2, Some(3)).unwrap()).unwrap();

@@ -14,7 +14,15 @@
 //! - **by direction**: in proportion to the reflection, `f_r cos(theta)`. Good for large lights and glossy surfaces; misses small lights.
 //!
 //! No light wins everywhere by one of them, which is what multiple importance sampling is for. With several lights a further coordinate
-//! chooses the light: [`ManyLights`].
+//! chooses the light: [`ManyLights`]. Errors with a large light nearby, then with many lights, technique by technique:
+//!
+//! <div>
+#![doc = include_str!("../../../../../docs/monte-carlo/planar-near-large-combined-evaluations.svg")]
+//! </div>
+//!
+//! <div>
+#![doc = include_str!("../../../../../docs/monte-carlo/many-lights-technique-evaluations.svg")]
+//! </div>
 
 mod many;
 mod quadrature;
