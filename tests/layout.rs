@@ -1,7 +1,9 @@
 //! Records and names that Rust and the shaders share, checked without a GPU: naga reads the shaders as wgpu does.
 
 use light_cache::Scheme;
-use render::gpu::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, Run, files, link};
+use render::gpu::{
+    FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run, files, link,
+};
 use scene::packed::{PackedLight, SceneParams};
 use std::mem::offset_of;
 use std::path::Path;
@@ -40,9 +42,10 @@ macro_rules! same_layout {
 fn records_lie_alike_in_memory() {
     let module = &module("path", Scheme::Uniform);
     same_layout!(module, "FrameParams", FrameParams: origin_ws, width, corner_ws, height, step_x_ws, frame, step_y_ws, weight,
-        seed, max_bounces, light_samples, clear, candidates, slots, pad);
+        seed, max_bounces, light_samples, clear, candidates, slots, controls);
     same_layout!(module, "FilmPixel", FilmPixel: hi, lo, weight_hi, weight_lo, count, nonfinite, rays_nearest, rays_occluded,
-        pad0, pad1);
+        pad0, pad1, control);
+    same_layout!(module, "PixelControl", PixelControl: share, count, mean_found, mean_control, found_sq, control_sq, mixed, scale);
     same_layout!(module, "Observation", PackedObservation: position_ws, light, normal_ws, flags, unshadowed, irradiance, pmf,
         weight);
     same_layout!(module, "SceneParams", SceneParams: fixed_root, top_root, placed, triangles, instances, meshes, materials,

@@ -1,5 +1,6 @@
 // One path for every pixel: crates/render/src/path.rs, vertex by vertex.
 #import "lib/constants.wgsl"
+#import "lib/control.wgsl"
 #import "lib/mis.wgsl"
 #import "lib/sequence.wgsl"
 #import "lib/wide.wgsl"
@@ -17,6 +18,8 @@
 
 // Whether the sampler wants to know what paths find out.
 override LEARNS: bool = false;
+// Whether choices come with a control variate.
+override CONTROLLED: bool = false;
 // Whether lights are compared at glossy surfaces.
 override RESAMPLES: bool = false;
 
@@ -41,6 +44,14 @@ struct Vertex {
 struct LightNumbers {
     choice: u32,
     point: vec2<u32>,
+}
+
+// What a path brings back.
+struct PathSample {
+    // Without the control variate.
+    radiance: vec3<f32>,
+    // A control variate, of mean zero.
+    control: vec3<f32>,
 }
 
 // What a path counts.
@@ -122,7 +133,7 @@ fn observe(vertex: Vertex, light: u32, pmf: f32, connection: Connection, visible
 // connection of the kept one again: cheaper than to keep them all, and connections are made in one place.
 // twin: crates/render/src/direct.rs estimate
 // twin: crates/render/src/resampling.rs estimate
-fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32, log: ptr<function, Log>) -> vec3<f32> {
+fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32, log: ptr<function, Log>) -> PathSample {
     let on_light = vec2<f32>(unit_f32(numbers.point.x), unit_f32(numbers.point.y));
     let candidates = vertex.candidates;
     let tried = count * f32(candidates);
@@ -147,7 +158,7 @@ fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32,
             kept = part;
         } else {
             if any == NONE {
-                return vec3<f32>(0.0);
+                return PathSample(vec3<f32>(0.0), vec3<f32>(0.0));
             }
             if candidates == 1u {
                 break;
@@ -176,15 +187,15 @@ fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32,
         visible = !occluded(connection.shadow_ray, vertex.surface.id, connection.to_id);
     }
     observe(vertex, choice.light, pmf, connection, visible, log);
-    var radiance = vec3<f32>(0.0);
+    var direct = PathSample(vec3<f32>(0.0), vec3<f32>(0.0));
     if candidates == 1u {
         // Whether or not the light arrives: the mean over all draws is zero.
-        radiance = vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
+        direct.control = vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
     }
     if visible {
-        radiance += connection.unweighted * (connection.weight / (count * pmf));
+        direct.radiance = connection.unweighted * (connection.weight / (count * pmf));
     }
-    return radiance;
+    return direct;
 }
 
 // twin: crates/render/src/resampling.rs keep
@@ -204,12 +215,12 @@ fn kept_candidate(shares: array<f32, MAX_CANDIDATES>, candidates: u32, position:
     return kept;
 }
 
-// The radiance that one path brings back.
+// What one path brings back.
 // twin: crates/render/src/path.rs path
-fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32> {
+fn trace_path(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> PathSample {
     var ray = eye_ray;
     var from_id = NO_PRIMITIVE;
-    var radiance = vec3<f32>(0.0);
+    var brought = PathSample(vec3<f32>(0.0), vec3<f32>(0.0));
     var throughput = vec3<f32>(1.0);
     // The vertex that the path has left.
     var left: Local;
@@ -235,7 +246,7 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
                     weight = mis_weight(left_pdf, lights_tried * sampler_pmf(left, surface.light) * pdf_light);
                 }
             }
-            radiance += throughput * surface.emitted * weight;
+            brought.radiance += throughput * surface.emitted * weight;
         }
         if bounce > frame.max_bounces {
             break;
@@ -266,7 +277,9 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
                     sequence_bits(numbers, 2u),
                     vec2<u32>(sequence_bits(numbers, 3u), sequence_bits(numbers, 4u)),
                 );
-                radiance += direct_light(local, vertex, for_light, f32(count), log);
+                let direct = direct_light(local, vertex, for_light, f32(count), log);
+                brought.radiance += direct.radiance;
+                brought.control += direct.control;
             }
         }
         if !continues {
@@ -296,12 +309,22 @@ fn path_radiance(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> vec3<f32>
         from_id = surface.id;
         bounce += 1u;
     }
-    return radiance;
+    return brought;
 }
 
 // twin: crates/sampling/src/sum.rs two_sum
-fn add_to_film(pixel: u32, radiance: vec3<f32>, log: Log) {
+fn add_to_film(pixel: u32, brought: PathSample, log: Log) {
     var sums = film[pixel];
+    var radiance = brought.radiance;
+    if CONTROLLED {
+        if frame.controls == CONTROLS_NEW {
+            sums.control = new_control();
+        } else if frame.controls == CONTROLS_LEARN {
+            sums.control = learn_control(sums.control);
+        }
+        radiance += brought.control * sums.control.share;
+        sums.control = note_control(sums.control, brought.radiance, brought.control);
+    }
     if frame.clear != 0u {
         sums.hi = vec4<f32>(0.0);
         sums.lo = vec4<f32>(0.0);
@@ -357,8 +380,8 @@ fn path(@builtin(global_invocation_id) id: vec3<u32>) {
     let at = vec2<f32>(f32(column), f32(row)) + offset;
     let direction_ws = normalize(frame.corner_ws + frame.step_x_ws * at.x + frame.step_y_ws * at.y);
     var log = Log(0u, 0u, 0u, pixel);
-    let radiance = path_radiance(pixel, Ray(frame.origin_ws, direction_ws, FAR), &log);
-    add_to_film(pixel, radiance, log);
+    let brought = trace_path(pixel, Ray(frame.origin_ws, direction_ws, FAR), &log);
+    add_to_film(pixel, brought, log);
     if LEARNS {
         for (var slot = log.observations; slot < frame.slots; slot++) {
             observations[pixel * frame.slots + slot].light = NO_LIGHT;

@@ -1,5 +1,20 @@
 // What the passes leave behind: sums per pixel, and observations. Rust: crates/render/src/gpu/layout.rs
 
+// The share of the control variate that a pixel takes, and what was seen of both, by luminance.
+struct PixelControl {
+    share: f32,
+    // Samples seen; fewer after each lesson.
+    count: f32,
+    mean_found: f32,
+    mean_control: f32,
+    // Sums of the squared and of the mixed deviations from the means.
+    found_sq: f32,
+    control_sq: f32,
+    mixed: f32,
+    // Of luminances: a power of two; 0 before there was a control.
+    scale: f32,
+}
+
 struct FilmPixel {
     // R, G, B, luminance squared, each times the weight of its frame: the rounded sum, and what rounding lost.
     hi: vec4<f32>,
@@ -13,6 +28,7 @@ struct FilmPixel {
     rays_occluded: u32,
     pad0: u32,
     pad1: u32,
+    control: PixelControl,
 }
 
 // What an eye-path vertex found out about a light.

@@ -19,8 +19,12 @@ struct FrameParams {
     candidates: u32,
     // Observations that a pixel has room for.
     slots: u32,
-    pad: u32,
+    // What pixels know of the control variate: CONTROLS_NEW, or CONTROLS_LEARN since the sampler has just learned, or neither.
+    controls: u32,
 }
+
+const CONTROLS_NEW: u32 = 1u;
+const CONTROLS_LEARN: u32 = 2u;
 
 @group(0) @binding(0) var<uniform> frame: FrameParams;
 // The points of the Sobol' sequence by position, nibble and dimension.

@@ -237,6 +237,11 @@ pub trait LightSampler: Debug + Send + Sync {
         Pace::STEADY
     }
 
+    /// Whether its choices may come with a control variate.
+    fn is_controlled(&self) -> bool {
+        false
+    }
+
     /// Learns from a frame, or keeps it for later. `logs`: one per tile, in tile order. Called after every frame, also with empty logs.
     fn end_frame(&mut self, scene: &Scene, logs: &[Vec<Observation>]);
 

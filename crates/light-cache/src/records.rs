@@ -133,6 +133,10 @@ impl<S: LightSampler> LightSampler for Recording<S> {
         self.inner.pace()
     }
 
+    fn is_controlled(&self) -> bool {
+        self.inner.is_controlled()
+    }
+
     fn set_eye(&mut self, eye_ws: Vec3) {
         self.inner.set_eye(eye_ws);
     }

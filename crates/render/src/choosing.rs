@@ -38,6 +38,7 @@ pub(crate) fn measure<D: DirectLight>(eye: &Eye<'_>, direct: &D) -> Choosing {
     let view = eye.view(&recorder);
     let mut log = TileLog {
         observations: &mut Vec::new(),
+        controls: &mut [],
         counters: Counters::default(),
     };
     // Tile by tile, as frames are rendered: what lies near each other is met one after the other.
@@ -88,6 +89,7 @@ impl DirectLight for Recorder {
         choices.push((vertex.point, numbers[0].choice));
         Direct {
             radiance: Vec3::ZERO,
+            control: Vec3::ZERO,
             light: None,
         }
     }

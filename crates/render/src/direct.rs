@@ -47,6 +47,8 @@ impl LightNumbers {
 pub(crate) struct Direct {
     /// Throughput included.
     pub(crate) radiance: Vec3,
+    /// A control variate, of mean zero: throughput included.
+    pub(crate) control: Vec3,
     /// The light that was chosen, the first of several, if one was.
     pub(crate) light: Option<u32>,
 }
@@ -81,6 +83,11 @@ pub(crate) trait DirectLight: Sync + Send {
     /// See [`LightSampler::pace`].
     fn pace(&self) -> Pace {
         Pace::STEADY
+    }
+
+    /// See [`LightSampler::is_controlled`].
+    fn is_controlled(&self) -> bool {
+        false
     }
 
     /// Tells where the eye is.
@@ -167,10 +174,11 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         }
         let count = numbers.len() as f32;
         let mut radiance = Vec3::ZERO;
+        let mut control = Vec3::ZERO;
         for (choice, numbers) in choices.iter().zip(numbers) {
             let Some(choice) = choice else { continue };
             // Whether or not the light arrives: the mean over all draws is zero.
-            radiance += vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
+            control += vertex.throughput * vertex.surface.bsdf.diffuse * choice.control * (FRAC_1_PI / count);
             let on_light = Vec2::from(numbers.point.map(unit_f32));
             let connection = Connection::new(scene, vertex, choice.light, count * choice.pmf, on_light);
             let visible = connection
@@ -188,6 +196,7 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         }
         Direct {
             radiance,
+            control,
             light: choices[0].map(|choice| choice.light),
         }
     }
@@ -203,6 +212,10 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
 
     fn pace(&self) -> Pace {
         self.0.pace()
+    }
+
+    fn is_controlled(&self) -> bool {
+        self.0.is_controlled()
     }
 
     fn set_eye(&mut self, eye_ws: Vec3) {

@@ -148,6 +148,7 @@ impl DirectLight for AllLights {
         }
         Direct {
             radiance: sum.as_vec3(),
+            control: Vec3::ZERO,
             light: None,
         }
     }

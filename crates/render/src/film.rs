@@ -226,6 +226,11 @@ impl Film {
         &mut self.tiles
     }
 
+    /// Pixels of each tile.
+    pub(crate) fn tile_areas(&self) -> impl Iterator<Item = usize> {
+        self.tiles.iter().map(|tile| tile.pixels.len())
+    }
+
     /// Number of tiles.
     pub(crate) fn tile_count(&self) -> usize {
         self.tiles.len()

@@ -7,6 +7,7 @@
 //! Absent from this crate: windows, the command line. Deterministic for a seed at any thread count.
 
 mod choosing;
+mod control;
 mod direct;
 pub mod error;
 mod exact;

@@ -82,6 +82,7 @@ impl Frames for Oracle {
         let counters = tiles.map(|(tile, known)| {
             let mut log = TileLog {
                 observations: &mut Vec::new(),
+                controls: &mut [],
                 counters: Counters::default(),
             };
             if stop.load(Ordering::Relaxed) {
@@ -91,15 +92,15 @@ impl Frames for Oracle {
                 let direct = OneLight(pixel);
                 let view = eye.view(&direct);
                 let start = Start::new(&view, x, y);
-                let radiance = if AOVS {
+                let found = if AOVS {
                     let mut aovs = AovSample::NONE;
-                    let radiance = path(&view, &start, &mut log, &mut aovs);
+                    let found = path(&view, &start, &mut log, &mut aovs);
                     tile.add_aovs(index, &aovs);
-                    radiance
+                    found
                 } else {
                     path(&view, &start, &mut log, &mut ())
                 };
-                if !tile.add(index, radiance) {
+                if !tile.add(index, found.radiance) {
                     log.counters.nonfinite += 1;
                 }
             }
@@ -167,6 +168,7 @@ fn survey(eye: &Eye<'_>, lights: &AllLights, passes: u32, x: u32, y: u32) -> Vec
     };
     let mut log = TileLog {
         observations: &mut Vec::new(),
+        controls: &mut [],
         counters: Counters::default(),
     };
     for pass in 0..passes {
@@ -225,6 +227,7 @@ impl DirectLight for Survey<'_> {
         }
         Direct {
             radiance: Vec3::ZERO,
+            control: Vec3::ZERO,
             light: None,
         }
     }

@@ -1,5 +1,6 @@
 //! The frame, from the tile down to the last bounce of a path: read it from top to bottom.
 
+use crate::control::{PathSample, PixelControl};
 use crate::direct::{DirectLight, LightNumbers, Vertex};
 use crate::film::{AovSample, Tile};
 use crate::filter::FilterSampler;
@@ -94,6 +95,8 @@ impl std::ops::Add for Counters {
 pub(crate) struct TileLog<'l> {
     /// In the order in which they were made. Stays empty for samplers that do not learn.
     pub(crate) observations: &'l mut Vec<Observation>,
+    /// Of the tile's pixels; empty where there is no control variate.
+    pub(crate) controls: &'l mut [PixelControl],
     pub(crate) counters: Counters,
 }
 
@@ -160,13 +163,17 @@ fn render_rows<D: DirectLight, const AOVS: bool>(view: &FrameView<'_, D>, tile: 
             for i in 0..PACKET.min((tile.width - column) as usize) {
                 let start = starts.get(i);
                 let index = (row * tile.width + column) as usize + i;
-                let radiance = if AOVS {
+                let found = if AOVS {
                     let mut aovs = AovSample::NONE;
-                    let radiance = path(view, &start, log, &mut aovs);
+                    let found = path(view, &start, log, &mut aovs);
                     tile.add_aovs(index, &aovs);
-                    radiance
+                    found
                 } else {
                     path(view, &start, log, &mut ())
+                };
+                let radiance = match log.controls.get_mut(index) {
+                    Some(control) => control.add(&found),
+                    None => found.radiance,
                 };
                 if !tile.add(index, radiance) {
                     log.counters.nonfinite += 1;
@@ -275,14 +282,14 @@ fn eye_direction_ws<D>(view: &FrameView<'_, D>, x: u32, y: u32, u: [u32; 2]) -> 
     view.camera.direction_ws(corner + offset)
 }
 
-/// The radiance that one path brings back.
+/// What one path brings back.
 #[inline(always)]
 pub(crate) fn path<D: DirectLight>(
     view: &FrameView<'_, D>,
     start: &Start,
     log: &mut TileLog<'_>,
     probe: &mut impl Probe,
-) -> Vec3 {
+) -> PathSample {
     let scene = view.scene;
     let mut ray = Ray {
         origin_ws: view.camera.origin_ws,
@@ -296,7 +303,10 @@ pub(crate) fn path<D: DirectLight>(
     let mut later_numbers;
     let mut light_numbers = &start.light_numbers[..view.light_samples as usize];
     let mut left: Option<Departure<D::Local<'_>>> = None;
-    let mut radiance = Vec3::ZERO;
+    let mut brought = PathSample {
+        radiance: Vec3::ZERO,
+        control: Vec3::ZERO,
+    };
     let mut throughput = Vec3::ONE;
     let mut bounce = 0;
     while let Some(hit) = found {
@@ -310,7 +320,7 @@ pub(crate) fn path<D: DirectLight>(
                 }
                 _ => 1.0,
             };
-            radiance += throughput * surface.emitted * weight;
+            brought.radiance += throughput * surface.emitted * weight;
         }
         if bounce > view.max_bounces {
             break;
@@ -338,7 +348,8 @@ pub(crate) fn path<D: DirectLight>(
             candidates: if glossy { view.candidates } else { 1 },
         };
         let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
-        radiance += direct.radiance;
+        brought.radiance += direct.radiance;
+        brought.control += direct.control;
         if bounce == 0 {
             probe.first_hit(&surface, hit.t, direct.light);
         }
@@ -379,7 +390,7 @@ pub(crate) fn path<D: DirectLight>(
         probe.nearest(&ray, surface.id);
         found = scene.nearest(&ray, surface.id);
     }
-    radiance
+    brought
 }
 
 /// The vertex that a path has left: what its hits are weighed by.

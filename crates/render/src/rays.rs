@@ -48,6 +48,7 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
     let mut film = crate::Film::new(settings.width, settings.height, false);
     let mut log = TileLog {
         observations: &mut Vec::new(),
+        controls: &mut [],
         counters: Counters::default(),
     };
     for tile in film.tiles_mut() {

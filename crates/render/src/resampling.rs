@@ -35,6 +35,7 @@ pub(crate) fn estimate<S: LightSampler>(
     let count = numbers.len() as f32;
     let mut direct = Direct {
         radiance: Vec3::ZERO,
+        control: Vec3::ZERO,
         light: None,
     };
     for numbers in numbers {

@@ -134,6 +134,10 @@ impl LightSampler for AdaptiveSampler {
         self.schedule.pace()
     }
 
+    fn is_controlled(&self) -> bool {
+        self.palette.is_some()
+    }
+
     /// What was learned may be wrong anywhere, and is learned again in a few frames.
     fn scene_changed(&mut self, scene: &Scene) {
         *self = Self::new(scene, &self.settings);

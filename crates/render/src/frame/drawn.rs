@@ -3,11 +3,13 @@
 use super::{Eye, Frames};
 use crate::Film;
 use crate::choosing::{self, Choosing};
+use crate::control::Controls;
 use crate::direct::DirectLight;
 use crate::path::{Counters, TileLog, render_tile};
 use light_cache::{CellRecord, LightRecord, Observation, SamplerStats, ShadingPoint};
 use rayon::prelude::*;
 use scene::Scene;
+use std::borrow::Cow;
 use std::ops::Add;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -18,6 +20,8 @@ pub(crate) struct Drawn<D> {
     pub(crate) first_frame: u32,
     /// What the last frame observed, one list per tile.
     pub(crate) observations: Vec<Vec<Observation>>,
+    /// How much of the control variate each pixel takes.
+    controls: Controls,
 }
 
 impl<D> Drawn<D> {
@@ -26,6 +30,7 @@ impl<D> Drawn<D> {
             direct,
             first_frame: 0,
             observations: Vec::new(),
+            controls: Controls::default(),
         }
     }
 }
@@ -53,6 +58,11 @@ impl<D: DirectLight> Frames for Drawn<D> {
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
         self.direct.set_eye(eye.camera.origin_ws);
         self.observations.resize(film.tile_count(), Vec::new());
+        self.controls = if self.direct.is_controlled() {
+            Controls::new(film)
+        } else {
+            Controls::none(film)
+        };
     }
 
     /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
@@ -61,14 +71,19 @@ impl<D: DirectLight> Frames for Drawn<D> {
         let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
         let pace = self.direct.pace();
         film.set_weight(pace.frame_weight);
-        let tiles = film.tiles_mut().par_iter_mut().zip(&mut self.observations);
-        let counters = tiles.map(|(tile, observations)| {
+        let tiles = film
+            .tiles_mut()
+            .par_iter_mut()
+            .zip(&mut self.observations)
+            .zip(self.controls.tiles_mut());
+        let counters = tiles.map(|((tile, observations), controls)| {
             observations.clear();
             if stop.load(Ordering::Relaxed) {
                 return Counters::default();
             }
             let mut log = TileLog {
                 observations,
+                controls,
                 counters: Counters::default(),
             };
             render_tile::<D, AOVS>(&view, tile, &mut log);
@@ -78,7 +93,9 @@ impl<D: DirectLight> Frames for Drawn<D> {
         if stop.load(Ordering::Relaxed) {
             return (counters, false);
         }
-        self.learn(&eye.scene, eye.frame);
+        if self.learn(&eye.scene, eye.frame) {
+            self.controls.learn();
+        }
         (counters, true)
     }
 
@@ -95,12 +112,20 @@ impl<D: DirectLight> Frames for Drawn<D> {
     }
 
     fn save(&self) -> Option<(u32, Vec<u8>)> {
-        Some((self.first_frame, self.direct.save()?))
+        let learned = (Cow::Borrowed(&self.controls), self.direct.save()?);
+        Some((self.first_frame, postcard::to_stdvec(&learned).ok()?))
     }
 
     fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool {
+        let Ok((controls, learned)) = postcard::from_bytes::<(Cow<'_, Controls>, Vec<u8>)>(learned) else {
+            return false;
+        };
+        if !controls.is_sound_like(&self.controls) {
+            return false;
+        }
+        self.controls = controls.into_owned();
         self.first_frame = first_frame;
-        self.direct.restore(learned)
+        self.direct.restore(&learned)
     }
 
     fn light_records(&self, scene: &Scene) -> Vec<LightRecord> {

@@ -38,6 +38,8 @@ pub(super) struct GpuFrames<S> {
     /// The last frame: no more than one is under way while the next is prepared.
     submitted: Option<wgpu::SubmissionIndex>,
     timer: Option<Timer>,
+    /// [`FrameParams::controls`] of the next frame.
+    controls: u32,
     /// Counts of films that are gone.
     counted: Counters,
     /// What the device has accumulated, since somebody asked.
@@ -66,7 +68,7 @@ impl<S: LightSampler> GpuFrames<S> {
             return Err(refusal(format!("the sampler '{}'", settings.method.name())));
         };
         let buffers = SceneBuffers::new(&gpu, scene)?;
-        let pipeline = compile::<S>(&gpu, &packed, &buffers, settings)?;
+        let pipeline = compile(&gpu, &sampler, &packed, &buffers, settings)?;
         let lesson_passes = S::LEARNS.then(|| LessonPasses::new(&gpu)).transpose()?;
         gpu.keep_pipelines();
         let params = uniform(&gpu, "frame", bytemuck::bytes_of(&FrameParams::default()));
@@ -89,6 +91,7 @@ impl<S: LightSampler> GpuFrames<S> {
             target: None,
             submitted: None,
             timer: None,
+            controls: FrameParams::CONTROLS_NEW,
             counted: Counters::default(),
             film: OnceCell::new(),
             failure: None,
@@ -154,7 +157,7 @@ impl<S: LightSampler> GpuFrames<S> {
             clear: u32::from(film.spp() == 0),
             candidates: eye.candidates,
             slots: target.size[2],
-            pad: 0,
+            controls: std::mem::take(&mut self.controls),
         };
         self.gpu
             .queue
@@ -205,6 +208,7 @@ impl<S: LightSampler> GpuFrames<S> {
             self.drawn.learn(&eye.scene, eye.frame)
         };
         if learned {
+            self.controls = FrameParams::CONTROLS_LEARN;
             self.upload_sampler()?;
         }
         Ok(())
@@ -279,6 +283,7 @@ pub(super) fn group(
 /// The path pass, specialised to scene, sampler and settings.
 fn compile<S: LightSampler>(
     gpu: &Gpu,
+    sampler: &S,
     packed: &Packed,
     scene: &SceneBuffers,
     settings: &Settings,
@@ -288,6 +293,7 @@ fn compile<S: LightSampler>(
     let heuristic = settings.mis.heuristic().map_or(4, |heuristic| heuristic as u32);
     let mut constants: Vec<(&str, f64)> = vec![
         ("LEARNS", f64::from(u8::from(S::LEARNS))),
+        ("CONTROLLED", f64::from(u8::from(sampler.is_controlled()))),
         ("RESAMPLES", f64::from(u8::from(resamples))),
         ("HEURISTIC", f64::from(heuristic)),
     ];
@@ -297,7 +303,8 @@ fn compile<S: LightSampler>(
 
 impl<S: LightSampler> Frames for GpuFrames<S> {
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
-        self.drawn.look(eye, film);
+        self.drawn.direct.0.set_eye(eye.camera.origin_ws);
+        self.controls = FrameParams::CONTROLS_NEW;
         let pixels = u64::from(eye.image_width) * u64::from(eye.image_height);
         if self.target.as_ref().is_some_and(|target| target.pixels == pixels) {
             return;

@@ -23,7 +23,29 @@ pub struct FrameParams {
     pub clear: u32,
     pub candidates: u32,
     pub slots: u32,
-    pub pad: u32,
+    pub controls: u32,
+}
+
+impl FrameParams {
+    /// [`FrameParams::controls`]: nothing is known yet.
+    pub(crate) const CONTROLS_NEW: u32 = 1;
+    /// [`FrameParams::controls`]: the sampler has just learned.
+    pub(crate) const CONTROLS_LEARN: u32 = 2;
+}
+
+/// How much of the control variate a pixel takes: `PixelControl` in `shaders/record/film.wgsl`.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader")]
+pub struct PixelControl {
+    pub share: f32,
+    pub count: f32,
+    pub mean_found: f32,
+    pub mean_control: f32,
+    pub found_sq: f32,
+    pub control_sq: f32,
+    pub mixed: f32,
+    pub scale: f32,
 }
 
 /// Sums of one pixel: `FilmPixel` in `shaders/record/film.wgsl`.
@@ -41,6 +63,7 @@ pub struct FilmPixel {
     pub rays_occluded: u32,
     pub pad0: u32,
     pub pad1: u32,
+    pub control: PixelControl,
 }
 
 impl FilmPixel {

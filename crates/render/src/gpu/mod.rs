@@ -21,7 +21,7 @@ mod timing;
 
 pub use device::{AdapterInfo, Gpu, adapters};
 pub use kernel::Kernel;
-pub use layout::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, Run};
+pub use layout::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run};
 pub use shader::{files, link};
 pub use timing::PassTime;
 

@@ -14,6 +14,7 @@ macro_rules! files {
 /// All files that the linker knows, by path.
 const FILES: &[(&str, &str)] = files![
     "lib/constants.wgsl",
+    "lib/control.wgsl",
     "lib/ggx.wgsl",
     "lib/hash.wgsl",
     "lib/hemisphere.wgsl",
