@@ -7,6 +7,7 @@
 //! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
+mod alone;
 pub mod assemble;
 pub mod bsdf;
 pub mod bvh;

@@ -54,13 +54,13 @@ pub struct Scene {
     pub center_ws: Vec3,
     /// Radius of the sphere around the bounding box, metres; at least a tiny positive number.
     pub radius: f32,
-    /// Seconds spent in building the BVH.
+    /// Seconds spent in building what every ray needs of the BVH; trees of instanced meshes follow when a ray first comes near them.
     pub build_s: f64,
     pub(crate) shading: Shading,
     bvh: Arc<Bvh>,
     /// Index into `parts.punctual` by light; empty if there are none.
     pub(crate) punctual_of_light: Vec<u32>,
-    /// By mesh, the first triangle of each run of triangles that come from one primitive of the file.
+    /// By mesh with emitting triangles, the first triangle of each run of triangles that come from one primitive of the file.
     runs: Vec<Vec<u32>>,
 }
 
@@ -120,7 +120,10 @@ impl Scene {
         })?;
         let (center, radius) = bounding_sphere(&parts);
         let Collected { lights, punctual } = collect(&mut parts, &mut shading, radius);
-        let runs = parts.meshes.iter().map(runs).collect();
+        let of_lamps = parts.meshes.iter().zip(&shading.emitters);
+        let runs = of_lamps
+            .map(|(mesh, emitters)| if emitters.is_empty() { Vec::new() } else { runs(mesh) })
+            .collect();
         let start = Instant::now();
         let bvh = Arc::new(Bvh::build(&parts));
         let mut scene = Self {
@@ -160,6 +163,10 @@ impl Scene {
                 "no alpha masks: rays stop at the first triangle",
             ),
             (placed_once, "no instancing: rays are not transformed"),
+            (
+                !placed_once,
+                "instanced meshes that no ray comes near: no trees, no shading records (render --stats counts them)",
+            ),
             (flat, "no smooth normals: no interpolation"),
             (lambert, "no glossy materials: lights are not looked for by reflection"),
             (self.lights.is_empty(), "no lights: no shadow rays"),
@@ -170,6 +177,15 @@ impl Scene {
             .filter(|(unneeded, _)| *unneeded)
             .map(|(_, line)| line.to_owned());
         self.parts.report.skipped.extend(lines);
+    }
+
+    /// Builds all that otherwise waits until a ray needs it: trees and shading records of instanced meshes. The image does not depend on it.
+    pub fn build_all(&self) {
+        self.bvh.build_all(&self.parts);
+        let meshes = 0..self.parts.meshes.len() as u32;
+        meshes.into_par_iter().for_each(|mesh| {
+            self.shading.records(&self.parts, mesh);
+        });
     }
 
     /// The acceleration structure.

@@ -1,5 +1,6 @@
 //! Axis-aligned boxes.
 
+use crate::Mesh;
 use glam::{Affine3A, Vec3};
 
 /// An axis-aligned box.
@@ -24,6 +25,17 @@ impl Bounds {
             min: a.min(b).min(c),
             max: a.max(b).max(c),
         }
+    }
+
+    /// The box around all triangles of a mesh; vertices that none uses do not count.
+    pub(super) fn of_mesh(mesh: &Mesh) -> Self {
+        let corners = mesh.indices.as_flattened().iter().map(|&v| mesh.positions[v as usize]);
+        corners.fold(Self::EMPTY, |around, p| around.union(Self { min: p, max: p }))
+    }
+
+    /// Whether nothing is inside.
+    pub(super) fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
     }
 
     /// The box around both.

@@ -1,6 +1,7 @@
 //! Every kernel against brute force in double precision.
 
 use super::*;
+use crate::Mesh;
 use crate::{Instance, Material};
 use glam::{Affine3A, DVec3, Mat3A, Quat};
 
