@@ -28,6 +28,7 @@ mod relight;
 pub mod report;
 mod scene;
 mod shading;
+pub mod stored;
 pub mod surface;
 pub mod texture;
 mod validate;
@@ -42,6 +43,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use report::Report;
 pub use scene::{Counts, Scene, SceneParts, load};
+pub use stored::StoredMesh;
 pub use surface::Surface;
 pub use texture::Texture;
 

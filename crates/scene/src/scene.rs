@@ -8,7 +8,7 @@ use crate::shading::Shading;
 use crate::validate::{texture_refs, validate};
 use crate::{
     Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report,
-    SceneError, Texture,
+    SceneError, StoredMesh, Texture,
 };
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ use std::time::Instant;
 pub struct SceneParts {
     /// For titles and file names: "rooms", "modern_hall".
     pub name: String,
-    /// Meshes. Mesh 0 holds all geometry that is placed once, in world space; further ones are instanced.
-    pub meshes: Vec<Mesh>,
+    /// Meshes. Mesh 0 holds geometry that is placed once, in world space; further ones are instanced. Some may still be in their file.
+    pub meshes: Vec<StoredMesh>,
     /// Placements. Instance 0 places mesh 0 by the identity, if there is such geometry.
     pub instances: Vec<Instance>,
     /// Materials.
@@ -103,6 +103,13 @@ pub fn load(what: &str) -> Result<Scene, SceneError> {
     Scene::new(parts)
 }
 
+impl SceneParts {
+    /// Whether a placement, which is instance 0, is of geometry that lies in world space and was read beforehand: what every ray needs.
+    pub(crate) fn is_fixed(&self, instance: &Instance) -> bool {
+        instance.identity && !self.meshes[instance.mesh as usize].is_deferred()
+    }
+}
+
 impl Scene {
     /// Checks `parts`, collects the lights and builds the BVH.
     ///
@@ -145,7 +152,7 @@ impl Scene {
     fn tell_skipped(&mut self) {
         let parts = &self.parts;
         let masked = |m: &Material| m.alpha_cutoff.is_some();
-        let flat = parts.meshes.iter().all(|mesh| mesh.normals.is_empty());
+        let flat = parts.meshes.iter().all(StoredMesh::is_flat);
         let placed_once = parts.instances.iter().all(|instance| instance.identity);
         let lambert = self
             .shading
@@ -186,6 +193,11 @@ impl Scene {
         meshes.into_par_iter().for_each(|mesh| {
             self.shading.records(&self.parts, mesh);
         });
+    }
+
+    /// Why a mesh could not be read when a ray first came near it, if one could not: the images since then lack it.
+    pub fn fault(&self) -> Option<&SceneError> {
+        self.parts.meshes.iter().find_map(StoredMesh::fault)
     }
 
     /// The acceleration structure.
@@ -297,19 +309,10 @@ impl Scene {
 pub(crate) fn bounding_sphere(parts: &SceneParts) -> (Vec3, f32) {
     let nothing = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-    // Vertices that no triangle uses do not count.
-    let bounds_of = |mesh: &Mesh| {
-        let vertices = mesh
-            .indices
-            .par_iter()
-            .flatten_iter()
-            .map(|&v| mesh.positions[v as usize]);
-        vertices.map(|p| (p, p)).reduce(nothing, join)
-    };
-    let local: Vec<(Vec3, Vec3)> = parts.meshes.iter().map(bounds_of).collect();
+    let local: Vec<[Vec3; 2]> = parts.meshes.par_iter().map(StoredMesh::bounds).collect();
     let mut bounds = nothing();
     for instance in &parts.instances {
-        let (least, most) = local[instance.mesh as usize];
+        let [least, most] = local[instance.mesh as usize];
         if least.x > most.x {
             continue;
         }

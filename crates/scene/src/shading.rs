@@ -7,7 +7,7 @@
 //! the material: two dependent cache misses fewer in a large scene.
 
 use crate::alone::alone;
-use crate::{Material, Mesh, SceneParts};
+use crate::{Material, Mesh, SceneParts, StoredMesh};
 use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::OnceLock;
@@ -118,7 +118,7 @@ pub(crate) struct Placement {
     pub(crate) mesh: u32,
     /// Index into [`Shading::lights`] of the instance's first emitting triangle.
     pub(crate) first_emitter: u32,
-    /// It is instance 0 and places its mesh by the identity: [`Shading::fixed`] has the records.
+    /// It is instance 0 and stands where it is stored, see [`SceneParts::is_fixed`]: [`Shading::fixed`] has the records.
     pub(crate) fixed: bool,
 }
 
@@ -142,10 +142,13 @@ impl Shading {
     ///
     /// `None` if there are more triangles, or more emitting ones, than a u32 counts.
     pub(crate) fn new(parts: &SceneParts) -> Option<Self> {
-        let triangles: usize = parts.meshes.iter().map(Mesh::len).sum();
+        let triangles: usize = parts.meshes.iter().map(StoredMesh::len).sum();
         u32::try_from(triangles).ok()?;
         let emitting: Vec<bool> = parts.materials.iter().map(Material::emits).collect();
-        let emitters = |mesh: &Mesh| -> Vec<u32> {
+        let emitters = |mesh: &StoredMesh| -> Vec<u32> {
+            if mesh.is_deferred() {
+                return Vec::new();
+            }
             (0..mesh.len() as u32)
                 .filter(|&i| emitting[mesh.materials[i as usize] as usize])
                 .collect()
@@ -161,7 +164,7 @@ impl Shading {
             shading.placements.push(Placement {
                 mesh: instance.mesh,
                 first_emitter: u32::try_from(first_emitter).ok()?,
-                fixed: index == 0 && instance.identity,
+                fixed: index == 0 && parts.is_fixed(instance),
             });
             first_emitter += shading.emitters[instance.mesh as usize].len();
         }

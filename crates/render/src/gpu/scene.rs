@@ -26,6 +26,9 @@ impl SceneBuffers {
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self, RenderError> {
         let too_large = |what: &str| GpuFault::OutOfMemory.error(format!("{what}; use --backend cpu"));
         let flat = scene.bvh().flat(&scene.parts);
+        if let Some(fault) = scene.fault() {
+            return Err(RenderError::Scene(fault.to_string()));
+        }
         if flat.stack + flat.top_stack > STACK {
             return Err(too_large("the scene's tree is deeper than the GPU back end walks"));
         }

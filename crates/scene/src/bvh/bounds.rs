@@ -1,6 +1,6 @@
 //! Axis-aligned boxes.
 
-use crate::Mesh;
+use crate::StoredMesh;
 use glam::{Affine3A, Vec3};
 
 /// An axis-aligned box.
@@ -27,10 +27,10 @@ impl Bounds {
         }
     }
 
-    /// The box around all triangles of a mesh; vertices that none uses do not count.
-    pub(super) fn of_mesh(mesh: &Mesh) -> Self {
-        let corners = mesh.indices.as_flattened().iter().map(|&v| mesh.positions[v as usize]);
-        corners.fold(Self::EMPTY, |around, p| around.union(Self { min: p, max: p }))
+    /// [`StoredMesh::bounds`].
+    pub(super) fn of_mesh(mesh: &StoredMesh) -> Self {
+        let [min, max] = mesh.bounds();
+        Self { min, max }
     }
 
     /// Whether nothing is inside.

@@ -123,7 +123,7 @@ impl Bvh {
             if bounds[mesh].is_empty() {
                 continue;
             }
-            if index == 0 && instance.identity {
+            if index == 0 && parts.is_fixed(instance) {
                 let tree = Tree::build(&parts.meshes[mesh], &parts.materials);
                 bvh.fixed = Some(Fixed { mesh, tree });
             } else {

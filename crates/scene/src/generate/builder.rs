@@ -1,7 +1,7 @@
 //! Closed solids out of triangles: the clay of which the generated scenes are made.
 
 use super::dice::sin_cos;
-use crate::{Camera, Instance, Light, LightSource, Material, Mesh, SceneParts, assemble, luminance};
+use crate::{Camera, Instance, Light, LightSource, Material, Mesh, SceneParts, StoredMesh, assemble, luminance};
 use glam::{Affine3A, Mat3, Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
@@ -386,8 +386,8 @@ impl Builder {
     /// The scene: what was built in place in mesh 0, placed by the identity, then the shared meshes.
     pub(super) fn finish(self) -> SceneParts {
         let mut parts = self.parts;
-        parts.meshes.push(self.mesh);
-        parts.meshes.extend(self.shared);
+        parts.meshes.push(self.mesh.into());
+        parts.meshes.extend(self.shared.into_iter().map(StoredMesh::from));
         parts.instances.push(Instance::identity(0, 0));
         parts.instances.extend(self.placed);
         parts
