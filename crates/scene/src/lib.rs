@@ -1,7 +1,8 @@
 //! A scene, loaded, checked and ready for rays.
 //!
 //! Data flows one way: a glTF file ([`load`]) or a generator ([`generate`]) fills a [`SceneParts`]; [`Scene::new`]
-//! validates it, finds the lights and builds the acceleration structure; after that a scene never changes.
+//! validates it, finds the lights and builds what every ray needs of the acceleration structure; after that a scene never changes, but for what is
+//! made or read when a ray first needs it ([`stored`], [`bvh`]).
 //!
 //! Absent from this crate: GPU, random state (samples take their `u` as an argument), windows. Files are read in
 //! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
