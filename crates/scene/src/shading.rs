@@ -200,7 +200,8 @@ impl Shading {
     }
 
     fn pack_mesh(&self, parts: &SceneParts, index: u32) -> Vec<TriangleRecord> {
-        let mesh = &parts.meshes[index as usize];
+        // As it was read: one that could not be has no triangles, whatever its file claims.
+        let mesh: &Mesh = &parts.meshes[index as usize];
         let records = (0..mesh.len()).into_par_iter();
         let mut records: Vec<TriangleRecord> = records.map(|i| pack(mesh, i, &parts.materials)).collect();
         for (emitter, &triangle) in self.emitters[index as usize].iter().enumerate() {
