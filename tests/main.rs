@@ -4,6 +4,8 @@
 mod cli;
 /// Scenes whose image is known in closed form.
 mod closed_form;
+/// Meshes that stay in their file until a ray comes near them.
+mod deferred;
 /// The GPU back end against the CPU.
 mod gpu;
 /// Records that Rust and the shaders share.

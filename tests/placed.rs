@@ -33,7 +33,7 @@ fn placed_and_masked() -> Scene {
         materials: vec![material; 2],
         ..Mesh::default()
     };
-    parts.meshes.extend([square(leaf), square(lamp)]);
+    parts.meshes.extend([square(leaf), square(lamp)].map(Into::into));
     let texel = |i: u32| {
         [
             200,

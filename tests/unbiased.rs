@@ -40,6 +40,7 @@ fn every_family_is_tested() {
         "points",
         "sun-outside",
         "plaza",
+        "city",
         "keyhole",
         "spheres",
         "one-light",
@@ -67,6 +68,11 @@ fn sun_outside() {
 #[test]
 fn plaza() {
     check_demo("plaza:64");
+}
+
+#[test]
+fn city() {
+    check_demo("city:64");
 }
 
 #[test]

@@ -20,6 +20,9 @@ pub enum RenderError {
         /// Why not.
         what: String,
     },
+    /// A part of the scene that was left in its file could not be read when a ray first needed it.
+    #[error("{0}")]
+    Scene(String),
     /// An image file could not be read.
     #[error("{path}: cannot read image: {reason}")]
     Read {

@@ -104,7 +104,8 @@ pub trait FrameLoop<'s>: Send {
     /// [`RenderStats::sampler`] alone, likewise.
     fn sampler_stats(&self) -> Option<SamplerStats>;
 
-    /// Why no more frames are made, if so: the device that made them is gone. Never for the CPU.
+    /// Why frames are not what they should be, if so: the device that made them is gone, or a mesh of the scene could not be read when a ray first
+    /// came near it.
     fn error(&self) -> Option<RenderError> {
         None
     }
@@ -433,7 +434,13 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     }
 
     fn error(&self) -> Option<RenderError> {
-        self.frames.error()
+        let fault = || {
+            self.eye
+                .scene
+                .fault()
+                .map(|fault| RenderError::Scene(fault.to_string()))
+        };
+        self.frames.error().or_else(fault)
     }
 
     fn size(&self) -> (u32, u32) {

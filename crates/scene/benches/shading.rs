@@ -43,7 +43,7 @@ fn field(side: u32, smooth: bool, emissive: bool) -> SceneParts {
     mesh.materials = vec![material; mesh.indices.len()];
     SceneParts {
         name: "field".into(),
-        meshes: vec![mesh],
+        meshes: vec![mesh.into()],
         instances: vec![Instance::identity(0, 0)],
         materials: vec![
             Material::lambert("grey", Vec3::splat(0.5)),

@@ -76,7 +76,7 @@ impl Builder {
         parts.name = "assembled".into();
         parts.origins = vec![("node".into(), "mesh".into())];
         if !self.mesh.is_empty() {
-            parts.meshes = vec![self.mesh.clone()];
+            parts.meshes = vec![self.mesh.clone().into()];
             parts.instances = vec![Instance::identity(0, 0)];
         }
         parts

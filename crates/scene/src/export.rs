@@ -7,7 +7,7 @@ mod document;
 mod geometry;
 mod material;
 
-use crate::{LightKind, SceneError, SceneParts, file};
+use crate::{LightKind, Mesh, SceneError, SceneParts, file};
 use document::{BufferView, Document, LightIndex, Node, NodeExtensions};
 use geometry::{Geometry, Packed};
 use glam::{Affine3A, DVec3, Quat, Vec3};
@@ -38,6 +38,12 @@ pub fn write_glb(parts: &SceneParts, path: &Path) -> Result<(), SceneError> {
 }
 
 fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
+    for mesh in &parts.meshes {
+        let _: &Mesh = mesh;
+        if let Some(fault) = mesh.fault() {
+            return Err(io::Error::other(fault.to_string()));
+        }
+    }
     let Packed {
         nodes,
         meshes,

@@ -1,12 +1,14 @@
 //! A scene, loaded, checked and ready for rays.
 //!
 //! Data flows one way: a glTF file ([`load`]) or a generator ([`generate`]) fills a [`SceneParts`]; [`Scene::new`]
-//! validates it, finds the lights and builds the acceleration structure; after that a scene never changes.
+//! validates it, finds the lights and builds what every ray needs of the acceleration structure; after that a scene never changes, but for what is
+//! made or read when a ray first needs it ([`stored`], [`bvh`]).
 //!
 //! Absent from this crate: GPU, random state (samples take their `u` as an argument), windows. Files are read in
 //! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
 //! is of unit length, every radiance is finite and at least zero.
 
+mod alone;
 pub mod assemble;
 pub mod bsdf;
 pub mod bvh;
@@ -27,6 +29,7 @@ mod relight;
 pub mod report;
 mod scene;
 mod shading;
+pub mod stored;
 pub mod surface;
 pub mod texture;
 mod validate;
@@ -41,6 +44,7 @@ pub use material::Material;
 pub use mesh::Mesh;
 pub use report::Report;
 pub use scene::{Counts, Scene, SceneParts, load};
+pub use stored::StoredMesh;
 pub use surface::Surface;
 pub use texture::Texture;
 

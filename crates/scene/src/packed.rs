@@ -1,6 +1,7 @@
 //! A scene as plain words, for back ends without pointers: `shaders/scene` reads what is written here.
 
 use crate::bsdf::albedo;
+use crate::bvh::FlatBvh;
 use crate::shading::MaterialRecord;
 use crate::texture::{TextureRef, Wrap, linear_from_srgb};
 use crate::{Instance, Light, LightKind, Material, Mesh, Scene, Texture};
@@ -149,9 +150,10 @@ impl Words {
 }
 
 impl Scene {
-    /// The scene as words; `None` if they are more than 32 bits can count. The tree is in [`crate::bvh::Bvh::flat`].
-    pub fn packed(&self) -> Option<PackedScene> {
-        let (parts, flat) = (&self.parts, self.bvh().flat());
+    /// The scene as words, beside its trees as words; `None` if the scene's are more than 32 bits can count. All is built that was not needed so
+    /// far: other back ends cannot ask for more.
+    pub fn packed(&self, flat: &FlatBvh) -> Option<PackedScene> {
+        let parts = &self.parts;
         let mut words = Words::default();
         let mut params = SceneParams {
             fixed_root: flat.fixed.unwrap_or(NONE),
@@ -167,11 +169,18 @@ impl Scene {
             .extend(flat.placed.iter().flat_map(|placed| placed.unwrap_or([NONE; 2])));
         params.triangles = words.here();
         let mut has_detail = false;
-        for triangle in &self.shading.triangles {
-            words.vec3(triangle.normal);
-            words.floats([triangle.plane]);
-            words.0.extend([triangle.material_word(), triangle.emitter]);
-            has_detail |= !triangle.plain();
+        let mut first_triangles = Vec::with_capacity(parts.meshes.len());
+        let mut first_triangle = 0;
+        for mesh in 0..parts.meshes.len() as u32 {
+            let records = self.shading.records(parts, mesh);
+            first_triangles.push(first_triangle);
+            first_triangle += records.len() as u32;
+            for triangle in records {
+                words.vec3(triangle.normal);
+                words.floats([triangle.plane]);
+                words.0.extend([triangle.material_word(), triangle.emitter]);
+                has_detail |= !triangle.plain();
+            }
         }
         params.emitter_lights = words.here();
         words.0.extend(&self.shading.lights);
@@ -188,7 +197,7 @@ impl Scene {
             pack_instance(
                 &mut words,
                 instance,
-                [placement.first_triangle, placement.first_emitter],
+                [first_triangles[placement.mesh as usize], placement.first_emitter],
             );
         }
         let meshes: Vec<[u32; 8]> = parts.meshes.iter().map(|mesh| pack_mesh(&mut words, mesh)).collect();

@@ -2,7 +2,7 @@
 //! the surfaces they leave grows with them.
 
 use crate::scene::bounding_sphere;
-use crate::{Instance, LightKind, SceneParts};
+use crate::{Instance, LightKind, SceneParts, StoredMesh};
 use glam::{DVec3, Vec3, Vec3A};
 
 /// Centres further from zero than this many radii of the scene are moved. Higher values leave more scenes as they are; lower values keep
@@ -18,9 +18,11 @@ pub(crate) fn recentre(parts: &mut SceneParts) {
     let centre = center.as_dvec3();
     // Differences of neighbours are exact in `f32` already; of others, the digits count.
     let moved = |p: Vec3| (p.as_dvec3() - centre).as_vec3();
-    let placed: Vec<bool> = (0..parts.meshes.len())
-        .map(|mesh| parts.instances.iter().any(|i| i.mesh as usize == mesh && !i.identity))
-        .collect();
+    // What is still in its file is moved by its placements.
+    let mut placed: Vec<bool> = parts.meshes.iter().map(StoredMesh::is_deferred).collect();
+    for instance in parts.instances.iter().filter(|instance| !instance.identity) {
+        placed[instance.mesh as usize] = true;
+    }
     for (mesh, placed) in parts.meshes.iter_mut().zip(&placed) {
         // In world space already, if it is anywhere at all.
         if !placed {

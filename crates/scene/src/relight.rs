@@ -48,10 +48,6 @@ impl Scene {
 
     /// Gives the triangles copies of their materials, one for each material and factor that occur.
     fn use_dimmed_materials(&mut self, factors: &HashMap<Stored, Vec3>) {
-        let mut first_triangles = vec![0; self.parts.meshes.len()];
-        for (placement, instance) in self.shading.placements.iter().zip(&self.parts.instances) {
-            first_triangles[instance.mesh as usize] = placement.first_triangle;
-        }
         let mut copies: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
         for (&(mesh, triangle), factor) in factors {
             let slot = &mut self.parts.meshes[mesh as usize].materials[triangle as usize];
@@ -66,7 +62,10 @@ impl Scene {
                     materials.push(copy);
                     materials.len() as u32 - 1
                 });
-            self.shading.triangles[(first_triangles[mesh as usize] + triangle) as usize].set_material(*slot);
+            // One that is not packed yet will be with its new material.
+            if let Some(record) = self.shading.packed_mut(mesh, triangle) {
+                record.set_material(*slot);
+            }
         }
     }
 }

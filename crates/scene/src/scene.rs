@@ -8,7 +8,7 @@ use crate::shading::Shading;
 use crate::validate::{texture_refs, validate};
 use crate::{
     Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report,
-    SceneError, Texture,
+    SceneError, StoredMesh, Texture,
 };
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -21,8 +21,8 @@ use std::time::Instant;
 pub struct SceneParts {
     /// For titles and file names: "rooms", "modern_hall".
     pub name: String,
-    /// Meshes. Mesh 0 holds all geometry that is placed once, in world space; further ones are instanced.
-    pub meshes: Vec<Mesh>,
+    /// Meshes. Mesh 0 holds geometry that is placed once, in world space; further ones are instanced. Some may still be in their file.
+    pub meshes: Vec<StoredMesh>,
     /// Placements. Instance 0 places mesh 0 by the identity, if there is such geometry.
     pub instances: Vec<Instance>,
     /// Materials.
@@ -54,13 +54,13 @@ pub struct Scene {
     pub center_ws: Vec3,
     /// Radius of the sphere around the bounding box, metres; at least a tiny positive number.
     pub radius: f32,
-    /// Seconds spent in building the BVH.
+    /// Seconds spent in building what every ray needs of the BVH; trees of instanced meshes follow when a ray first comes near them.
     pub build_s: f64,
     pub(crate) shading: Shading,
     bvh: Arc<Bvh>,
     /// Index into `parts.punctual` by light; empty if there are none.
     pub(crate) punctual_of_light: Vec<u32>,
-    /// By mesh, the first triangle of each run of triangles that come from one primitive of the file.
+    /// By mesh with emitting triangles, the first triangle of each run of triangles that come from one primitive of the file.
     runs: Vec<Vec<u32>>,
 }
 
@@ -103,6 +103,13 @@ pub fn load(what: &str) -> Result<Scene, SceneError> {
     Scene::new(parts)
 }
 
+impl SceneParts {
+    /// Whether a placement, which is instance 0, is of geometry that lies in world space and was read beforehand: what every ray needs.
+    pub(crate) fn is_fixed(&self, instance: &Instance) -> bool {
+        instance.identity && !self.meshes[instance.mesh as usize].is_deferred()
+    }
+}
+
 impl Scene {
     /// Checks `parts`, collects the lights and builds the BVH.
     ///
@@ -120,7 +127,10 @@ impl Scene {
         })?;
         let (center, radius) = bounding_sphere(&parts);
         let Collected { lights, punctual } = collect(&mut parts, &mut shading, radius);
-        let runs = parts.meshes.iter().map(runs).collect();
+        let of_lamps = parts.meshes.iter().zip(&shading.emitters);
+        let runs = of_lamps
+            .map(|(mesh, emitters)| if emitters.is_empty() { Vec::new() } else { runs(mesh) })
+            .collect();
         let start = Instant::now();
         let bvh = Arc::new(Bvh::build(&parts));
         let mut scene = Self {
@@ -142,7 +152,7 @@ impl Scene {
     fn tell_skipped(&mut self) {
         let parts = &self.parts;
         let masked = |m: &Material| m.alpha_cutoff.is_some();
-        let flat = parts.meshes.iter().all(|mesh| mesh.normals.is_empty());
+        let flat = parts.meshes.iter().all(StoredMesh::is_flat);
         let placed_once = parts.instances.iter().all(|instance| instance.identity);
         let lambert = self
             .shading
@@ -160,6 +170,10 @@ impl Scene {
                 "no alpha masks: rays stop at the first triangle",
             ),
             (placed_once, "no instancing: rays are not transformed"),
+            (
+                !placed_once,
+                "instanced meshes that no ray comes near: no trees, no shading records (render --stats counts them)",
+            ),
             (flat, "no smooth normals: no interpolation"),
             (lambert, "no glossy materials: lights are not looked for by reflection"),
             (self.lights.is_empty(), "no lights: no shadow rays"),
@@ -170,6 +184,20 @@ impl Scene {
             .filter(|(unneeded, _)| *unneeded)
             .map(|(_, line)| line.to_owned());
         self.parts.report.skipped.extend(lines);
+    }
+
+    /// Builds all that otherwise waits until a ray needs it: trees and shading records of instanced meshes. The image does not depend on it.
+    pub fn build_all(&self) {
+        self.bvh.build_all(&self.parts);
+        let meshes = 0..self.parts.meshes.len() as u32;
+        meshes.into_par_iter().for_each(|mesh| {
+            self.shading.records(&self.parts, mesh);
+        });
+    }
+
+    /// Why a mesh could not be read when a ray first came near it, if one could not: the images since then lack it.
+    pub fn fault(&self) -> Option<&SceneError> {
+        self.parts.meshes.iter().find_map(StoredMesh::fault)
     }
 
     /// The acceleration structure.
@@ -281,19 +309,10 @@ impl Scene {
 pub(crate) fn bounding_sphere(parts: &SceneParts) -> (Vec3, f32) {
     let nothing = || (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let join = |a: (Vec3, Vec3), b: (Vec3, Vec3)| (a.0.min(b.0), a.1.max(b.1));
-    // Vertices that no triangle uses do not count.
-    let bounds_of = |mesh: &Mesh| {
-        let vertices = mesh
-            .indices
-            .par_iter()
-            .flatten_iter()
-            .map(|&v| mesh.positions[v as usize]);
-        vertices.map(|p| (p, p)).reduce(nothing, join)
-    };
-    let local: Vec<(Vec3, Vec3)> = parts.meshes.iter().map(bounds_of).collect();
+    let local: Vec<[Vec3; 2]> = parts.meshes.par_iter().map(StoredMesh::bounds).collect();
     let mut bounds = nothing();
     for instance in &parts.instances {
-        let (least, most) = local[instance.mesh as usize];
+        let [least, most] = local[instance.mesh as usize];
         if least.x > most.x {
             continue;
         }

@@ -1,12 +1,16 @@
 //! Packed records for [`crate::Scene::surface`]: what nearly every hit needs, without touching meshes and materials.
 //!
+//! Those of mesh 0 are packed beforehand, those of other meshes when one is first hit.
+//!
 //! A hit on a flat untextured triangle that is placed once reads one placement, one triangle record (24 bytes) and one
 //! material record (48 bytes, shared by many hits), instead of indices, three positions, the material index and
 //! the material: two dependent cache misses fewer in a large scene.
 
-use crate::{Material, Mesh, SceneParts};
+use crate::alone::alone;
+use crate::{Material, Mesh, SceneParts, StoredMesh};
 use glam::Vec3;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// Marks a triangle whose material does not emit.
 pub(crate) const NO_EMITTER: u32 = u32::MAX;
@@ -110,23 +114,26 @@ impl Lobes {
 /// Where the records of an instance begin.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Placement {
-    /// Index of the mesh's first triangle record.
-    pub(crate) first_triangle: u32,
+    /// Index of the mesh.
+    pub(crate) mesh: u32,
     /// Index into [`Shading::lights`] of the instance's first emitting triangle.
     pub(crate) first_emitter: u32,
-    /// Local space is world space.
-    pub(crate) identity: bool,
+    /// It is instance 0 and stands where it is stored, see [`SceneParts::is_fixed`]: [`Shading::fixed`] has the records.
+    pub(crate) fixed: bool,
 }
 
 /// All records of a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Shading {
     pub(crate) placements: Vec<Placement>,
-    pub(crate) triangles: Vec<TriangleRecord>,
+    /// Records of the mesh of instance 0, if it is placed by the identity.
+    pub(crate) fixed: Vec<TriangleRecord>,
+    /// By mesh, records of the others.
+    triangles: Vec<OnceLock<Vec<TriangleRecord>>>,
     pub(crate) materials: Vec<MaterialRecord>,
     /// Light index by placed emitting triangle, [`crate::surface::NO_LIGHT`] where that triangle is too small to be one.
     pub(crate) lights: Vec<u32>,
-    /// Per mesh, the emitting triangles.
+    /// Per mesh, the emitting triangles, in increasing order.
     pub(crate) emitters: Vec<Vec<u32>>,
 }
 
@@ -135,41 +142,72 @@ impl Shading {
     ///
     /// `None` if there are more triangles, or more emitting ones, than a u32 counts.
     pub(crate) fn new(parts: &SceneParts) -> Option<Self> {
-        let triangles: usize = parts.meshes.iter().map(Mesh::len).sum();
+        let triangles: usize = parts.meshes.iter().map(StoredMesh::len).sum();
         u32::try_from(triangles).ok()?;
+        let emitting: Vec<bool> = parts.materials.iter().map(Material::emits).collect();
+        let emitters = |mesh: &StoredMesh| -> Vec<u32> {
+            if mesh.is_deferred() {
+                return Vec::new();
+            }
+            (0..mesh.len() as u32)
+                .filter(|&i| emitting[mesh.materials[i as usize] as usize])
+                .collect()
+        };
         let mut shading = Self {
-            triangles: Vec::with_capacity(triangles),
+            triangles: parts.meshes.iter().map(|_| OnceLock::new()).collect(),
             materials: parts.materials.iter().map(MaterialRecord::new).collect(),
+            emitters: parts.meshes.par_iter().map(emitters).collect(),
             ..Self::default()
         };
-        let mut first_triangles = Vec::with_capacity(parts.meshes.len());
-        for mesh in &parts.meshes {
-            first_triangles.push(shading.triangles.len() as u32);
-            let emitters: Vec<u32> = (0..mesh.len() as u32)
-                .filter(|&i| parts.materials[mesh.materials[i as usize] as usize].emits())
-                .collect();
-            let first = shading.triangles.len();
-            let records = (0..mesh.len()).into_par_iter();
-            shading
-                .triangles
-                .par_extend(records.map(|i| pack(mesh, i, &parts.materials)));
-            for (emitter, &triangle) in emitters.iter().enumerate() {
-                shading.triangles[first + triangle as usize].emitter = emitter as u32;
-            }
-            shading.emitters.push(emitters);
-        }
         let mut first_emitter = 0_usize;
-        for instance in &parts.instances {
+        for (index, instance) in parts.instances.iter().enumerate() {
             shading.placements.push(Placement {
-                first_triangle: first_triangles[instance.mesh as usize],
+                mesh: instance.mesh,
                 first_emitter: u32::try_from(first_emitter).ok()?,
-                identity: instance.identity,
+                fixed: index == 0 && parts.is_fixed(instance),
             });
             first_emitter += shading.emitters[instance.mesh as usize].len();
         }
         u32::try_from(first_emitter).ok()?;
         shading.lights = vec![crate::surface::NO_LIGHT; first_emitter];
+        if let Some(mesh) = shading.fixed_mesh() {
+            shading.fixed = shading.pack_mesh(parts, mesh);
+        }
         Some(shading)
+    }
+
+    fn fixed_mesh(&self) -> Option<u32> {
+        self.placements
+            .first()
+            .filter(|first| first.fixed)
+            .map(|first| first.mesh)
+    }
+
+    /// The records of a mesh, packed now if none of its triangles was hit before.
+    pub(crate) fn records(&self, parts: &SceneParts, mesh: u32) -> &[TriangleRecord] {
+        if self.fixed_mesh() == Some(mesh) {
+            return &self.fixed;
+        }
+        self.triangles[mesh as usize].get_or_init(|| alone(|| self.pack_mesh(parts, mesh)))
+    }
+
+    /// The record of a triangle, if it is packed already.
+    pub(crate) fn packed_mut(&mut self, mesh: u32, triangle: u32) -> Option<&mut TriangleRecord> {
+        if self.fixed_mesh() == Some(mesh) {
+            return self.fixed.get_mut(triangle as usize);
+        }
+        self.triangles[mesh as usize].get_mut()?.get_mut(triangle as usize)
+    }
+
+    fn pack_mesh(&self, parts: &SceneParts, index: u32) -> Vec<TriangleRecord> {
+        // As it was read: one that could not be has no triangles, whatever its file claims.
+        let mesh: &Mesh = &parts.meshes[index as usize];
+        let records = (0..mesh.len()).into_par_iter();
+        let mut records: Vec<TriangleRecord> = records.map(|i| pack(mesh, i, &parts.materials)).collect();
+        for (emitter, &triangle) in self.emitters[index as usize].iter().enumerate() {
+            records[triangle as usize].emitter = emitter as u32;
+        }
+        records
     }
 }
 

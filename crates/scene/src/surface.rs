@@ -37,8 +37,11 @@ impl Scene {
     #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit) -> Surface {
         let placement = &self.shading.placements[hit.id.instance as usize];
-        let triangle = &self.shading.triangles[(placement.first_triangle + hit.id.triangle) as usize];
-        let (position_ws, normal_ws) = if placement.identity {
+        let triangle = match placement.fixed {
+            true => &self.shading.fixed[hit.id.triangle as usize],
+            false => self.placed_record(placement.mesh, hit.id.triangle),
+        };
+        let (position_ws, normal_ws) = if placement.fixed {
             // Pulled on to the plane: as exact across the surface as interpolation of the corners, without reading them.
             // What error remains lies within the plane, where it does no harm.
             let along = ray.origin_ws + ray.direction_ws * hit.t;
@@ -79,6 +82,13 @@ impl Scene {
             self.refine(&mut refined, triangle, ray, hit);
             refined
         }
+    }
+
+    /// The record of a triangle that is not in world space.
+    #[cold]
+    #[inline(never)]
+    fn placed_record(&self, mesh: u32, triangle: u32) -> &TriangleRecord {
+        &self.shading.records(&self.parts, mesh)[triangle as usize]
     }
 
     /// World position and front normal of a hit on an instance that is not where its mesh is.

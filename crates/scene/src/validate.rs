@@ -26,8 +26,11 @@ pub(crate) fn validate(parts: &mut SceneParts) -> Result<(), SceneError> {
     }
     let (materials, origins) = (parts.materials.len(), parts.origins.len());
     for (index, mesh) in parts.meshes.iter_mut().enumerate() {
-        check_mesh(index, mesh, materials, origins, &fault)?;
-        repair_mesh(mesh, report);
+        // Others are found sound when they are read.
+        if !mesh.is_deferred() {
+            check_mesh(index, mesh, materials, origins, &fault)?;
+            repair_mesh(mesh, report);
+        }
     }
     check_instances(parts, &fault)?;
     parts.cameras.retain(|camera| {
@@ -198,7 +201,8 @@ fn check_mesh(index: usize, mesh: &Mesh, materials: usize, origins: usize, fault
     Ok(())
 }
 
-fn repair_mesh(mesh: &mut Mesh, report: &mut Report) {
+/// Makes normals and tangents unit vectors or zero, and texture coordinates and colours finite.
+pub(crate) fn repair_mesh(mesh: &mut Mesh, report: &mut Report) {
     let name = mesh.name.clone();
     let mut tell = |what: &str, count: usize| {
         if count > 0 {

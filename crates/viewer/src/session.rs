@@ -24,6 +24,15 @@ pub(crate) struct Loaded {
     pub(crate) load_s: f64,
 }
 
+impl Loaded {
+    /// Builds what otherwise waits until a ray needs it, see [`Scene::build_all`].
+    pub(crate) fn build_all(&mut self) {
+        let start = Instant::now();
+        self.scene.build_all();
+        self.scene.build_s += start.elapsed().as_secs_f64();
+    }
+}
+
 /// Whether `word` looks like a scene rather than a mistyped command.
 pub(crate) fn looks_like_scene(word: &str) -> bool {
     let extension = Path::new(word).extension().and_then(|e| e.to_str()).unwrap_or_default();

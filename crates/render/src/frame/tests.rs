@@ -49,7 +49,7 @@ fn box_scene(wall: Material, lamp: Option<Material>, points: &[(Vec3, Vec3)]) ->
     };
     let parts = SceneParts {
         name: "box".into(),
-        meshes: vec![mesh],
+        meshes: vec![mesh.into()],
         instances: vec![Instance {
             mesh: 0,
             origin: 0,

@@ -45,7 +45,7 @@ pub(crate) fn build_parts(name: &str) -> Option<SceneParts> {
     };
     Some(SceneParts {
         name: name.into(),
-        meshes: vec![mesh],
+        meshes: vec![mesh.into()],
         instances: vec![Instance {
             mesh: 0,
             origin: 0,

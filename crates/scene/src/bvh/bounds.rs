@@ -1,5 +1,6 @@
 //! Axis-aligned boxes.
 
+use crate::StoredMesh;
 use glam::{Affine3A, Vec3};
 
 /// An axis-aligned box.
@@ -24,6 +25,17 @@ impl Bounds {
             min: a.min(b).min(c),
             max: a.max(b).max(c),
         }
+    }
+
+    /// [`StoredMesh::bounds`].
+    pub(super) fn of_mesh(mesh: &StoredMesh) -> Self {
+        let [min, max] = mesh.bounds();
+        Self { min, max }
+    }
+
+    /// Whether nothing is inside.
+    pub(super) fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
     }
 
     /// The box around both.

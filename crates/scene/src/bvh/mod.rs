@@ -2,7 +2,7 @@
 //!
 //! A binary tree (`bvh2`, built by the `obvhs` crate) is collapsed into nodes of eight quantised boxes (`node`) and
 //! leaves of up to eight triangles (`pack`), so that a vector instruction tests all of one (`kernel`). Each mesh has
-//! one tree in its own space. Mesh 0 lies in world space and is walked first; instances of other meshes, if there are
+//! one tree in its own space (`tree`), built when a ray first comes near. Mesh 0 lies in world space and is walked first; instances of other meshes, if there are
 //! any, are found through one more tree over their boxes.
 
 mod alpha;
@@ -16,8 +16,10 @@ mod pack;
 mod packet;
 mod query;
 mod traverse;
+mod tree;
 
-use crate::{Mesh, SceneParts};
+use crate::SceneParts;
+use crate::alone::alone;
 use bounds::Bounds;
 pub use flat::FlatBvh;
 use glam::Vec3;
@@ -29,6 +31,9 @@ use node::Node;
 use pack::Pack;
 pub use packet::{PACKET, Packet};
 use query::Query;
+use rayon::prelude::*;
+use std::sync::OnceLock;
+use tree::Tree;
 
 /// A ray. `direction` is of unit length; hits count in (0, `t_max`).
 #[derive(Clone, Copy, Debug)]
@@ -71,95 +76,104 @@ pub struct Hit {
     pub id: PrimitiveId,
 }
 
-/// The acceleration structure over all instances of a scene.
+/// The acceleration structure over all instances of a scene. What is placed once has its tree from the beginning; the trees of other meshes are
+/// built when the first ray enters the box around one of their instances.
 #[derive(Debug)]
 pub struct Bvh {
     /// One that this processor has.
     kernel: Kernel,
-    /// Nodes of all trees; the first one is empty.
-    nodes: Vec<Node>,
-    /// Triangles of all meshes; the first one is empty.
-    packs: Vec<Pack>,
-    /// Root of the tree of instance 0, if it places its mesh by the identity.
-    fixed: Option<u32>,
-    /// Root of the tree over `placed`.
-    top: Option<u32>,
-    /// All other instances.
-    placed: Vec<Placed>,
+    /// The mesh of instance 0, if it is placed by the identity.
+    fixed: Option<Fixed>,
+    /// The tree over `placed`.
+    top: Option<Top>,
+    /// All other instances, by leaf of the top tree.
+    placed: Vec<u32>,
+    /// By mesh. A tree depends on its mesh only, whichever ray needed it first.
+    trees: Vec<OnceLock<Tree>>,
 }
 
-/// An instance that is found through the top level.
-#[derive(Clone, Copy, Debug)]
-struct Placed {
-    instance: u32,
-    /// Root of its mesh's tree.
+/// Geometry in world space.
+#[derive(Debug)]
+struct Fixed {
+    mesh: usize,
+    tree: Tree,
+}
+
+/// The tree over the boxes of instances.
+#[derive(Debug)]
+struct Top {
+    nodes: Vec<Node>,
     root: u32,
 }
 
 impl Bvh {
-    /// Builds it for the geometry of `parts` (already validated). Triangles without area are left out.
+    /// Builds what every ray needs of it for the geometry of `parts` (already validated). Triangles without area are left out.
     pub fn build(parts: &SceneParts) -> Self {
         let mut bvh = Self {
-            nodes: vec![Node::new(&[], node::LEAF)],
-            packs: vec![Pack::EMPTY],
+            kernel: Kernel::available().pop().unwrap_or(Kernel::Portable),
             fixed: None,
             top: None,
             placed: Vec::new(),
-            kernel: Kernel::available().pop().unwrap_or(Kernel::Portable),
+            trees: parts.meshes.iter().map(|_| OnceLock::new()).collect(),
         };
-        let trees: Vec<_> = parts.meshes.iter().map(|mesh| bvh.add_mesh(parts, mesh)).collect();
+        let bounds: Vec<Bounds> = parts.meshes.par_iter().map(Bounds::of_mesh).collect();
         let mut boxes = Vec::new();
         for (index, instance) in parts.instances.iter().enumerate() {
-            let Some((root, bounds)) = trees[instance.mesh as usize] else {
+            let mesh = instance.mesh as usize;
+            if bounds[mesh].is_empty() {
                 continue;
-            };
-            if index == 0 && instance.identity {
-                bvh.fixed = Some(root);
+            }
+            if index == 0 && parts.is_fixed(instance) {
+                let tree = Tree::build(&parts.meshes[mesh], &parts.materials);
+                bvh.fixed = Some(Fixed { mesh, tree });
             } else {
-                bvh.placed.push(Placed {
-                    instance: index as u32,
-                    root,
-                });
-                boxes.push(bounds.transformed(&instance.world_from_local));
+                bvh.placed.push(index as u32);
+                boxes.push(bounds[mesh].transformed(&instance.world_from_local));
             }
         }
         if !boxes.is_empty() {
-            bvh.placed.push(Placed { instance: 0, root: 0 });
             let tree = bvh2::build(&boxes);
-            let empty = boxes.len() as u32;
-            bvh.top = Some(collapse::collapse(&tree, 1, empty, &mut bvh.nodes, |instances| {
-                instances[0]
-            }));
+            let mut nodes = Vec::new();
+            let root = collapse::collapse(&tree, 1, boxes.len() as u32, &mut nodes, |instances| instances[0]);
+            nodes.shrink_to_fit();
+            bvh.top = Some(Top { nodes, root });
         }
-        bvh.nodes.shrink_to_fit();
-        bvh.packs.shrink_to_fit();
         bvh
     }
 
-    /// Adds the tree of a mesh; returns its root and its box, or `None` if there is nothing to hit.
-    fn add_mesh(&mut self, parts: &SceneParts, mesh: &Mesh) -> Option<(u32, Bounds)> {
-        let has_area = |triangle: &u32| {
-            let [a, b, c] = mesh.corners(*triangle as usize).map(Vec3::as_dvec3);
-            (b - a).cross(c - a).length_squared() > 0.0
-        };
-        let triangles: Vec<u32> = (0..mesh.len() as u32).filter(has_area).collect();
-        if triangles.is_empty() {
-            return None;
+    /// The tree of a mesh, built now if no ray came near it before.
+    #[inline]
+    fn tree(&self, parts: &SceneParts, mesh: u32) -> &Tree {
+        match self.trees[mesh as usize].get() {
+            Some(tree) => tree,
+            None => self.first_use(parts, mesh),
         }
-        let boxes: Vec<Bounds> = triangles
-            .iter()
-            .map(|&triangle| Bounds::of_triangle(mesh.corners(triangle as usize)))
-            .collect();
-        let around = boxes.iter().fold(Bounds::EMPTY, |around, b| around.union(*b));
-        let tree = bvh2::build(&boxes);
-        drop(boxes);
-        let packs = &mut self.packs;
-        let root = collapse::collapse(&tree, node::WIDTH as u32, 0, &mut self.nodes, |boxes| {
-            let triangles = boxes.iter().map(|&index| triangles[index as usize]);
-            packs.push(Pack::new(mesh, &parts.materials, triangles));
-            packs.len() as u32 - 1
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn first_use(&self, parts: &SceneParts, mesh: u32) -> &Tree {
+        match &self.fixed {
+            Some(fixed) if fixed.mesh == mesh as usize => &fixed.tree,
+            _ => self.trees[mesh as usize]
+                .get_or_init(|| alone(|| Tree::build(&parts.meshes[mesh as usize], &parts.materials))),
+        }
+    }
+
+    /// Builds all trees that were not needed so far.
+    pub fn build_all(&self, parts: &SceneParts) {
+        let mut meshes: Vec<u32> = parts.instances.iter().map(|instance| instance.mesh).collect();
+        meshes.sort_unstable();
+        meshes.dedup();
+        meshes.into_par_iter().for_each(|mesh| {
+            self.tree(parts, mesh);
         });
-        Some((root, around))
+    }
+
+    /// Number of meshes whose trees are built.
+    pub fn built(&self) -> usize {
+        let built = self.trees.iter().filter(|tree| tree.get().is_some()).count();
+        built + usize::from(self.fixed.is_some())
     }
 
     /// The nearest hit, or `None`. `from` is skipped (the triangle the ray starts on).
@@ -233,9 +247,12 @@ impl Bvh {
         }
     }
 
-    /// Bytes held.
+    /// Bytes held by what is built.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.nodes) + size_of_val(&*self.packs) + size_of_val(&*self.placed)
+        let fixed = self.fixed.as_ref().map_or(0, |fixed| fixed.tree.bytes());
+        let top = self.top.as_ref().map_or(0, |top| size_of_val(&*top.nodes));
+        let trees: usize = self.trees.iter().filter_map(OnceLock::get).map(Tree::bytes).sum();
+        fixed + top + trees + size_of_val(&*self.placed)
     }
 }
 
@@ -290,9 +307,9 @@ macro_rules! compile {
                     v: 0.0,
                     id: PrimitiveId::NONE,
                 }; PACKET];
-                let alike = match bvh.fixed {
-                    // SAFETY: see above; `root` was made by `collapse`.
-                    Some(root) => unsafe { packet::nearest::<$instructions>(bvh, parts, root, packet, &mut best) },
+                let alike = match &bvh.fixed {
+                    // SAFETY: see above; the tree was made by `collapse`.
+                    Some(fixed) => unsafe { packet::nearest::<$instructions>(&fixed.tree, parts, packet, &mut best) },
                     None => true,
                 };
                 let mut hits = [None; PACKET];

@@ -8,7 +8,8 @@ use super::kernel::{Instructions, LocalRay, PackHits};
 use super::node::{LEAF, WIDTH};
 use super::pack::INDEX;
 use super::query::counts;
-use super::{Bvh, Hit, PrimitiveId};
+use super::tree::Tree;
+use super::{Hit, PrimitiveId};
 use crate::SceneParts;
 use glam::Vec3;
 use std::mem::MaybeUninit;
@@ -103,17 +104,15 @@ struct Entry {
 /// Each node on a path leaves at most all children but one behind.
 const STACK: usize = MAX_DEPTH * (WIDTH - 1) + WIDTH;
 
-/// The nearest hits in the tree at `root`, which is that of instance 0, into `best`; false, and nothing done, if the
-/// rays are not alike.
+/// The nearest hits in the tree of instance 0, into `best`; false, and nothing done, if the rays are not alike.
 ///
 /// # Safety
-/// That of [`Instructions`]; and `root` must come from [`super::collapse::collapse`] into the nodes of `bvh`.
+/// That of [`Instructions`].
 #[allow(unsafe_code, reason = "as the walk of a single ray")]
 #[inline(always)]
 pub(super) unsafe fn nearest<I: Instructions>(
-    bvh: &Bvh,
+    tree: &Tree,
     parts: &SceneParts,
-    root: u32,
     packet: &Packet,
     best: &mut [Hit; PACKET],
 ) -> bool {
@@ -125,16 +124,16 @@ pub(super) unsafe fn nearest<I: Instructions>(
     let mut height = 0usize;
     let mut current = Entry {
         near: 0.0,
-        child: root,
+        child: tree.root,
         rays: (1 << PACKET) - 1,
     };
     // SAFETY: as in `traverse::walk`; rays are numbered below `PACKET`.
     unsafe {
         loop {
             if current.child & LEAF != 0 {
-                leaf::<I>(bvh, parts, &mut rays, &current, best);
+                leaf::<I>(tree, parts, &mut rays, &current, best);
             } else {
-                let node = bvh.nodes.get_unchecked(current.child as usize);
+                let node = tree.nodes.get_unchecked(current.child as usize);
                 let planes = I::planes(node, &rays.first);
                 let mut near = [f32::INFINITY; WIDTH];
                 // One byte of rays per child.
@@ -190,7 +189,7 @@ pub(super) unsafe fn nearest<I: Instructions>(
 #[allow(unsafe_code, reason = "calls the kernels")]
 #[inline(always)]
 unsafe fn leaf<I: Instructions>(
-    bvh: &Bvh,
+    tree: &Tree,
     parts: &SceneParts,
     rays: &mut Rays,
     entry: &Entry,
@@ -199,7 +198,7 @@ unsafe fn leaf<I: Instructions>(
     const INSTANCE: u32 = 0;
     // SAFETY: leaves of a mesh's tree are indices of packs; the rest as the caller promises.
     unsafe {
-        let pack = bvh.packs.get_unchecked((entry.child & !LEAF) as usize);
+        let pack = tree.packs.get_unchecked((entry.child & !LEAF) as usize);
         let corners = I::corners(pack, &rays.first);
         let mut hits = PackHits::default();
         let mut left = entry.rays;

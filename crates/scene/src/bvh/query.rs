@@ -5,6 +5,7 @@
 use super::kernel::{Instructions, LocalRay, PackHits};
 use super::pack::{INDEX, MASKED, ONE_SIDED};
 use super::traverse::{Visitor, walk};
+use super::tree::Tree;
 use super::{Bvh, Hit, PrimitiveId, Ray, alpha};
 use crate::SceneParts;
 
@@ -20,6 +21,7 @@ pub(super) struct Query<'a> {
 /// The triangles of one instance, for a query.
 struct InInstance<'a, I: Instructions> {
     query: &'a Query<'a>,
+    tree: &'a Tree,
     ray: &'a I::Ray,
     instance: u32,
     skip: [u32; 2],
@@ -58,22 +60,22 @@ impl<'a> Query<'a> {
     /// That of [`Instructions`], here as in all functions below.
     #[inline(always)]
     pub(super) unsafe fn nearest_fixed<I: Instructions>(&self, best: &mut Hit) {
-        if let Some(root) = self.bvh.fixed {
+        if let Some(fixed) = &self.bvh.fixed {
             let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             // SAFETY: as the caller promises.
-            unsafe { self.nearest_in::<I>(root, 0, &local, best) };
+            unsafe { self.nearest_in::<I>(&fixed.tree, 0, &local, best) };
         }
     }
 
     /// [`Bvh::nearest`] among instanced geometry; `best` is lowered.
     #[inline(always)]
     pub(super) unsafe fn nearest_placed<I: Instructions>(&self, best: &mut Hit) {
-        if let Some(root) = self.bvh.top {
+        if let Some(top) = &self.bvh.top {
             let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
             let t_max = best.t;
             let mut visitor = NearestPlaced { query: self, best };
             // SAFETY: as the caller promises; `top` was made by `collapse`.
-            unsafe { walk::<I, true>(&self.bvh.nodes, root, &I::ray(&world), t_max, &mut visitor) };
+            unsafe { walk::<I, true>(&top.nodes, top.root, &I::ray(&world), t_max, &mut visitor) };
         }
     }
 
@@ -81,53 +83,55 @@ impl<'a> Query<'a> {
     #[inline(always)]
     pub(super) unsafe fn occluded_fixed<I: Instructions>(&self) -> bool {
         // Not a closure given to `Option`: only what is inlined is compiled for the instruction set.
-        let Some(root) = self.bvh.fixed else { return false };
+        let Some(fixed) = &self.bvh.fixed else { return false };
         let local = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
         // SAFETY: as the caller promises.
-        unsafe { self.occluded_in::<I>(root, 0, &local) }
+        unsafe { self.occluded_in::<I>(&fixed.tree, 0, &local) }
     }
 
     /// [`Bvh::occluded`] by instanced geometry.
     #[inline(always)]
     pub(super) unsafe fn occluded_placed<I: Instructions>(&self) -> bool {
-        let Some(root) = self.bvh.top else { return false };
+        let Some(top) = &self.bvh.top else { return false };
         let world = LocalRay::new(self.ray.origin_ws, self.ray.direction_ws);
         let mut visitor = AnyPlaced {
             query: self,
             found: false,
         };
+        // Nearest first here too: what a near instance blocks needs no trees of farther ones.
         // SAFETY: as the caller promises; `top` was made by `collapse`.
-        unsafe { walk::<I, false>(&self.bvh.nodes, root, &I::ray(&world), self.ray.t_max, &mut visitor) };
+        unsafe { walk::<I, true>(&top.nodes, top.root, &I::ray(&world), self.ray.t_max, &mut visitor) };
         visitor.found
     }
 
     #[inline(always)]
-    unsafe fn nearest_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay, best: &mut Hit) {
+    unsafe fn nearest_in<I: Instructions>(&self, tree: &Tree, instance: u32, local: &LocalRay, best: &mut Hit) {
         let t_max = best.t;
-        // SAFETY: as the caller promises; `root` was made by `collapse`.
+        // SAFETY: as the caller promises; trees are made by `collapse`.
         unsafe {
             let ray = I::ray(local);
-            let geometry = self.in_instance::<I>(instance, &ray);
-            walk::<I, true>(&self.bvh.nodes, root, &ray, t_max, &mut Nearest { geometry, best });
+            let geometry = self.in_instance::<I>(tree, instance, &ray);
+            walk::<I, true>(&tree.nodes, tree.root, &ray, t_max, &mut Nearest { geometry, best });
         }
     }
 
     #[inline(always)]
-    unsafe fn occluded_in<I: Instructions>(&self, root: u32, instance: u32, local: &LocalRay) -> bool {
-        // SAFETY: as the caller promises; `root` was made by `collapse`.
+    unsafe fn occluded_in<I: Instructions>(&self, tree: &Tree, instance: u32, local: &LocalRay) -> bool {
+        // SAFETY: as the caller promises; trees are made by `collapse`.
         unsafe {
             let ray = I::ray(local);
-            let geometry = self.in_instance::<I>(instance, &ray);
+            let geometry = self.in_instance::<I>(tree, instance, &ray);
             let mut visitor = Any { geometry, found: false };
-            walk::<I, false>(&self.bvh.nodes, root, &ray, self.ray.t_max, &mut visitor);
+            walk::<I, false>(&tree.nodes, tree.root, &ray, self.ray.t_max, &mut visitor);
             visitor.found
         }
     }
 
     #[inline(always)]
-    fn in_instance<'q, I: Instructions>(&'q self, instance: u32, ray: &'q I::Ray) -> InInstance<'q, I> {
+    fn in_instance<'q, I: Instructions>(&'q self, tree: &'q Tree, instance: u32, ray: &'q I::Ray) -> InInstance<'q, I> {
         InInstance {
             query: self,
+            tree,
             ray,
             instance,
             skip: self
@@ -135,6 +139,14 @@ impl<'a> Query<'a> {
                 .map(|id| if id.instance == instance { id.triangle } else { u32::MAX }),
             hits: PackHits::default(),
         }
+    }
+
+    /// Instance and tree of a leaf of the top tree; `None` for the leaf that stands for no instance.
+    #[inline(always)]
+    fn placed(&self, leaf: u32) -> Option<(u32, &'a Tree)> {
+        let &instance = self.bvh.placed.get(leaf as usize)?;
+        let mesh = self.parts.instances[instance as usize].mesh;
+        Some((instance, self.bvh.tree(self.parts, mesh)))
     }
 
     /// The ray in the space of an instance's mesh; distances stay the same.
@@ -155,7 +167,7 @@ impl<I: Instructions> InInstance<'_, I> {
     unsafe fn test(&mut self, leaf: u32, t_max: f32, mut hit: impl FnMut(&PackHits, usize, u32) -> bool) {
         // SAFETY: leaves of a mesh's tree are indices of packs; the rest as the caller promises.
         let (pack, mut mask) = unsafe {
-            let pack = self.query.bvh.packs.get_unchecked(leaf as usize);
+            let pack = self.tree.packs.get_unchecked(leaf as usize);
             (pack, I::triangles(self.ray, pack, t_max, &mut self.hits))
         };
         while mask != 0 {
@@ -241,13 +253,11 @@ impl<I: Instructions> Visitor<I> for Any<'_, I> {
 impl<I: Instructions> Visitor<I> for NearestPlaced<'_> {
     #[inline(always)]
     unsafe fn leaf(&mut self, leaf: u32, _t_max: f32) -> f32 {
-        let placed = &self.query.bvh.placed[leaf as usize];
-        let local = self.query.local(placed.instance);
-        // SAFETY: as the caller promises.
-        unsafe {
-            self.query
-                .nearest_in::<I>(placed.root, placed.instance, &local, self.best)
-        };
+        if let Some((instance, tree)) = self.query.placed(leaf) {
+            let local = self.query.local(instance);
+            // SAFETY: as the caller promises.
+            unsafe { self.query.nearest_in::<I>(tree, instance, &local, self.best) };
+        }
         self.best.t
     }
 }
@@ -256,10 +266,12 @@ impl<I: Instructions> Visitor<I> for NearestPlaced<'_> {
 impl<I: Instructions> Visitor<I> for AnyPlaced<'_> {
     #[inline(always)]
     unsafe fn leaf(&mut self, leaf: u32, t_max: f32) -> f32 {
-        let placed = &self.query.bvh.placed[leaf as usize];
-        let local = self.query.local(placed.instance);
+        let Some((instance, tree)) = self.query.placed(leaf) else {
+            return t_max;
+        };
+        let local = self.query.local(instance);
         // SAFETY: as the caller promises.
-        self.found = unsafe { self.query.occluded_in::<I>(placed.root, placed.instance, &local) };
+        self.found = unsafe { self.query.occluded_in::<I>(tree, instance, &local) };
         if self.found { -1.0 } else { t_max }
     }
 }

@@ -1,6 +1,7 @@
 //! Every kernel against brute force in double precision.
 
 use super::*;
+use crate::Mesh;
 use crate::{Instance, Material};
 use glam::{Affine3A, DVec3, Mat3A, Quat};
 
@@ -54,7 +55,7 @@ fn place(mesh: u32, world_from_local: Affine3A) -> Instance {
 
 fn static_scene(triangles: &[[Vec3; 3]]) -> SceneParts {
     SceneParts {
-        meshes: vec![mesh_of(triangles)],
+        meshes: vec![mesh_of(triangles).into()],
         instances: vec![place(0, Affine3A::IDENTITY)],
         materials: vec![Material::lambert("", Vec3::ONE)],
         ..SceneParts::default()
@@ -211,7 +212,7 @@ fn check_packet(parts: &SceneParts, bvh: &Bvh, packet: &Packet, tolerance: f32) 
 fn packets_agree_with_single_rays() {
     let mut numbers = Numbers(11);
     let mut instanced = static_scene(&soup(&mut numbers, 300, 0.4));
-    instanced.meshes.push(mesh_of(&soup(&mut numbers, 50, 0.3)));
+    instanced.meshes.push(mesh_of(&soup(&mut numbers, 50, 0.3)).into());
     let turned = Affine3A::from_rotation_translation(Quat::from_rotation_x(1.0), Vec3::new(0.5, 0.0, -0.5));
     instanced.instances.push(place(1, turned));
     for parts in [static_scene(&soup(&mut numbers, 1000, 0.3)), instanced] {
@@ -315,7 +316,7 @@ fn instances_agree_with_brute_force() {
         for count in [7, 40] {
             let mut mesh = mesh_of(&soup(&mut numbers, count, 0.5));
             mesh.materials.iter_mut().step_by(2).for_each(|material| *material = 1);
-            parts.meshes.push(mesh);
+            parts.meshes.push(mesh.into());
         }
         for i in 0..20 {
             let size = Vec3::new(numbers.unit() + 0.1, numbers.unit() + 0.1, numbers.unit() + 0.1) * 0.3;

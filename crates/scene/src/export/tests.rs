@@ -105,13 +105,14 @@ fn glossy_materials_survive_the_round_trip() {
 #[test]
 fn a_shared_mesh_is_stored_once() {
     let mut parts = crate::generate::demo("one-light").unwrap();
-    parts.meshes.push(Mesh {
+    let mesh = Mesh {
         name: "leaflet".into(),
         positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
         indices: vec![[0, 1, 2]],
         materials: vec![0],
         ..Mesh::default()
-    });
+    };
+    parts.meshes.push(mesh.into());
     for i in 0..3 {
         parts.origins.push((format!("copy {i}"), "leaflet".into()));
         let place = Affine3A::from_translation(Vec3::new(i as f32, 0.0, 0.5));

@@ -1,8 +1,8 @@
 //! Closed solids out of triangles: the clay of which the generated scenes are made.
 
 use super::dice::sin_cos;
-use crate::{Camera, Instance, Light, LightSource, Material, Mesh, SceneParts, assemble, luminance};
-use glam::{Vec2, Vec3};
+use crate::{Camera, Instance, Light, LightSource, Material, Mesh, SceneParts, StoredMesh, assemble, luminance};
+use glam::{Affine3A, Mat3, Vec2, Vec3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
 
@@ -37,16 +37,32 @@ impl Pose {
     pub(super) fn point(&self, v: Vec3) -> Vec3 {
         self.origin + self.direction(v)
     }
+
+    /// The pose `inner`, which is given in the local space of this one.
+    pub(super) fn of(&self, inner: Self) -> Self {
+        let x_axis = self.direction(Vec3::new(inner.x_axis.x, 0.0, inner.x_axis.y));
+        Self {
+            origin: self.point(inner.origin),
+            x_axis: Vec2::new(x_axis.x, x_axis.z),
+        }
+    }
+
+    fn world_from_local(&self) -> Affine3A {
+        let axes = [Vec3::X, Vec3::Y, Vec3::Z].map(|axis| self.direction(axis));
+        Affine3A::from_mat3_translation(Mat3::from_cols(axes[0], axes[1], axes[2]), self.origin)
+    }
 }
 
 /// Index of a material.
 pub(super) type Paint = u32;
 
-/// Collects one static mesh, its materials and its lights.
+/// Collects one static mesh, meshes that are placed by instances, their materials and lights.
 #[derive(Default)]
 pub(super) struct Builder {
     parts: SceneParts,
     mesh: Mesh,
+    shared: Vec<Mesh>,
+    placed: Vec<Instance>,
     paints: BTreeMap<[u32; 6], Paint>,
     emissive_triangles: usize,
     origin: u32,
@@ -289,14 +305,45 @@ impl Builder {
         }
     }
 
+    /// A mesh of its own out of what `make` builds around the origin; it stands where [`Builder::instance`] places it. Returns its index.
+    pub(super) fn shared(&mut self, name: &str, make: impl FnOnce(&mut Self)) -> u32 {
+        let fixed = std::mem::take(&mut self.mesh);
+        self.place_in_world();
+        make(self);
+        self.place_in_world();
+        let mut mesh = std::mem::replace(&mut self.mesh, fixed);
+        mesh.name = name.into();
+        // Its triangles stand where its instances do.
+        mesh.origins = Vec::new();
+        if mesh.normals.iter().all(|normal| *normal == Vec3::ZERO) {
+            mesh.normals = Vec::new();
+        }
+        self.shared.push(mesh);
+        self.shared.len() as u32
+    }
+
+    /// Places a mesh that [`Builder::shared`] has made, as part of the current node.
+    pub(super) fn instance(&mut self, mesh: u32, pose: &Pose) {
+        let place = Instance::new(mesh, self.origin, pose.world_from_local());
+        self.placed.push(place.expect("poses are rigid"));
+    }
+
+    /// A light from infinity along the unit vector `along`, of this irradiance, named as the current node.
+    pub(super) fn directional_light(&mut self, along: Vec3, irradiance: Vec3) {
+        self.add_punctual(assemble::directional(along, irradiance));
+    }
+
     /// A point light of this radiant intensity (RGB), named as the current node.
     pub(super) fn point_light(&mut self, at: Vec3, intensity: Vec3) {
         let position_ws = self.pose.map_or(at, |pose| pose.point(at));
-        let (node, mesh) = self.parts.origins[self.origin as usize].clone();
-        let light = Light {
+        self.add_punctual(Light {
             cos_outer: -1.0,
             ..assemble::point(position_ws, intensity)
-        };
+        });
+    }
+
+    fn add_punctual(&mut self, light: Light) {
+        let (node, mesh) = self.parts.origins[self.origin as usize].clone();
         let source = LightSource {
             node,
             mesh,
@@ -336,11 +383,13 @@ impl Builder {
             .push(Camera::look_at(name, eye, target, Vec3::Y, fov_y));
     }
 
-    /// The scene: everything in mesh 0, placed by the identity.
+    /// The scene: what was built in place in mesh 0, placed by the identity, then the shared meshes.
     pub(super) fn finish(self) -> SceneParts {
         let mut parts = self.parts;
-        parts.meshes.push(self.mesh);
+        parts.meshes.push(self.mesh.into());
+        parts.meshes.extend(self.shared.into_iter().map(StoredMesh::from));
         parts.instances.push(Instance::identity(0, 0));
+        parts.instances.extend(self.placed);
         parts
     }
 }

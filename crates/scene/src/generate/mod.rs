@@ -5,6 +5,9 @@
 
 mod builder;
 mod building;
+mod city;
+mod city_house;
+mod city_street;
 mod dice;
 mod fixtures;
 mod furnish;
@@ -73,6 +76,15 @@ const FAMILIES: &[Family] = &[
         make: rooms::sun_outside,
         shut: None,
         walk: Some(|lights, seed| rooms::walk(lights - 1, seed)),
+    },
+    Family {
+        name: "city",
+        shows: "a town at night, house after house, from inside one room or from above; most of it never seen",
+        lights: MANY,
+        default: 4096,
+        make: city::city,
+        shut: None,
+        walk: None,
     },
     Family {
         name: "keyhole",

@@ -6,12 +6,13 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 /// Lights of a scene: emissive triangles and punctual lights.
 fn lights(parts: &SceneParts) -> usize {
     let emissive = |&material: &u32| parts.materials[material as usize].emits();
-    let triangles: usize = parts
+    let of_mesh: Vec<usize> = parts
         .meshes
         .iter()
         .map(|m| m.materials.iter().filter(|m| emissive(m)).count())
-        .sum();
-    triangles + parts.punctual.len()
+        .collect();
+    let triangles = parts.instances.iter().map(|i| of_mesh[i.mesh as usize]);
+    triangles.sum::<usize>() + parts.punctual.len()
 }
 
 fn triangles(parts: &SceneParts) -> usize {
@@ -37,12 +38,15 @@ fn small() -> Vec<String> {
 
 fn fingerprint(parts: &SceneParts) -> u64 {
     let mut hasher = DefaultHasher::new();
-    let mesh = &parts.meshes[0];
-    for v in mesh.positions.iter().chain(&mesh.normals) {
-        v.to_array().map(f32::to_bits).hash(&mut hasher);
+    for mesh in &parts.meshes {
+        for v in mesh.positions.iter().chain(&mesh.normals) {
+            v.to_array().map(f32::to_bits).hash(&mut hasher);
+        }
+        (&mesh.indices, &mesh.materials, &mesh.origins).hash(&mut hasher);
     }
-    (&mesh.indices, &mesh.materials, &mesh.origins, &parts.origins).hash(&mut hasher);
+    parts.origins.hash(&mut hasher);
     format!("{:?} {:?} {:?}", parts.materials, parts.punctual, parts.cameras).hash(&mut hasher);
+    format!("{:?}", parts.instances).hash(&mut hasher);
     hasher.finish()
 }
 
@@ -87,45 +91,51 @@ fn scenes_are_the_same_on_every_machine() {
 fn solids_are_closed_and_sound() {
     for what in small() {
         let parts = make(&what);
-        let mesh = &parts.meshes[0];
-        assert_eq!(mesh.positions.len(), mesh.normals.len());
-        let mut edges = std::collections::BTreeMap::new();
-        let mut seen = std::collections::BTreeSet::new();
-        for i in 0..mesh.len() {
-            let corners = mesh.corners(i);
-            let [a, b, c] = corners;
-            assert!(corners.iter().all(|p| p.is_finite()), "{what}: triangle {i}");
-            let area = 0.5 * (b - a).cross(c - a).length();
-            assert!(
-                area > 1e-9,
-                "{what}: triangle {i} of {:?}",
-                parts.origins[mesh.origins[i] as usize]
-            );
-            let bits = corners.map(|p| p.to_array().map(f32::to_bits));
-            let mut sorted = bits;
-            sorted.sort_unstable();
-            assert!(seen.insert(sorted), "{what}: triangle {i} twice");
-            if !parts.materials[mesh.materials[i] as usize].emits() {
-                for (from, to) in [(0, 1), (1, 2), (2, 0)] {
-                    *edges.entry((bits[from], bits[to])).or_insert(0) += 1;
-                    *edges.entry((bits[to], bits[from])).or_insert(0) -= 1;
-                }
+        for mesh in &parts.meshes {
+            assert_closed_and_sound(&what, &parts, mesh);
+        }
+    }
+}
+
+fn assert_closed_and_sound(what: &str, parts: &SceneParts, mesh: &crate::Mesh) {
+    assert!(mesh.normals.is_empty() || mesh.positions.len() == mesh.normals.len());
+    let mut edges = std::collections::BTreeMap::new();
+    let mut seen = std::collections::BTreeSet::new();
+    for i in 0..mesh.len() {
+        let corners = mesh.corners(i);
+        let [a, b, c] = corners;
+        assert!(corners.iter().all(|p| p.is_finite()), "{what}: triangle {i}");
+        let area = 0.5 * (b - a).cross(c - a).length();
+        let origin = mesh.origins.get(i).map(|&origin| &parts.origins[origin as usize]);
+        let what = format!("{what}, mesh '{}', {origin:?}", mesh.name);
+        assert!(area > 1e-9, "{what}: triangle {i}");
+        let bits = corners.map(|p| p.to_array().map(f32::to_bits));
+        let mut sorted = bits;
+        sorted.sort_unstable();
+        assert!(seen.insert(sorted), "{what}: triangle {i} twice");
+        if !parts.materials[mesh.materials[i] as usize].emits() {
+            for (from, to) in [(0, 1), (1, 2), (2, 0)] {
+                *edges.entry((bits[from], bits[to])).or_insert(0) += 1;
+                *edges.entry((bits[to], bits[from])).or_insert(0) -= 1;
             }
         }
-        // In closed solids every edge is walked as often one way as the other.
-        let open = edges.values().filter(|&&balance| balance != 0).count();
-        assert_eq!(open, 0, "{what}: {open} open edges");
-        for normal in &mesh.normals {
-            assert!(*normal == Vec3::ZERO || (normal.length() - 1.0).abs() < 1e-5);
-        }
+    }
+    // In closed solids every edge is walked as often one way as the other.
+    let open = edges.values().filter(|&&balance| balance != 0).count();
+    assert_eq!(open, 0, "{what}: {open} open edges");
+    for normal in &mesh.normals {
+        assert!(*normal == Vec3::ZERO || (normal.length() - 1.0).abs() < 1e-5);
     }
 }
 
 /// Distance to the nearest triangle along a ray, and whether it was met from its front. By brute force.
 fn look(parts: &SceneParts, origin: Vec3, direction: Vec3) -> Option<(f32, bool)> {
-    let mesh = &parts.meshes[0];
-    let hits = (0..mesh.len()).filter_map(|i| {
-        let [a, b, c] = mesh.corners(i);
+    let placed = parts.instances.iter().flat_map(|instance| {
+        let mesh = &parts.meshes[instance.mesh as usize];
+        let place = instance.world_from_local;
+        (0..mesh.len()).map(move |i| mesh.corners(i).map(|p| place.transform_point3(p)))
+    });
+    let hits = placed.filter_map(|[a, b, c]| {
         let (e1, e2) = (b - a, c - a);
         let p = direction.cross(e2);
         let det = e1.dot(p);

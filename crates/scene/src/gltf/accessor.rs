@@ -3,14 +3,15 @@
 use super::json::{self, Checked, ComponentType, Index, Type, View};
 use super::source::Source;
 use crate::SceneError;
+use std::borrow::Cow;
 
 /// Elements that an accessor without any bytes (all zeros) may claim in a small file.
 const FREE_ZEROS: u64 = 1 << 16;
 
 /// Elements at equal distances in bytes that are known to be there.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Strided<'a> {
-    bytes: &'a [u8],
+    bytes: Cow<'a, [u8]>,
     stride: usize,
 }
 
@@ -78,7 +79,7 @@ impl<'a> Accessor<'a> {
             return Err(bad(format!("claims {count} elements")));
         }
         let strided = |view: Index<View>, offset: u64, count: u64, element: u64| -> Result<Strided<'a>, SceneError> {
-            let bytes = source.view(view, &place)?;
+            let length = source.view_length(view, &place)?;
             // `view` has found it, so it is there.
             let stride = source.json.buffer_views[view.value()]
                 .byte_stride
@@ -95,13 +96,13 @@ impl<'a> Accessor<'a> {
                     .and_then(|n| n.checked_add(element)?.checked_add(offset)),
             };
             match end {
-                Some(end) if end <= bytes.len() as u64 => Ok(Strided {
-                    bytes: bytes.get(offset as usize..).unwrap_or_default(),
+                // An empty range may begin anywhere.
+                Some(end) if end <= length => Ok(Strided {
+                    bytes: source.range(view, offset.min(end)..end, &place)?,
                     stride: stride as usize,
                 }),
                 _ => Err(bad(format!(
-                    "claims {count} elements of {element} bytes, but bufferView {view} has {} bytes",
-                    bytes.len()
+                    "claims {count} elements of {element} bytes, but bufferView {view} has {length} bytes"
                 ))),
             }
         };
@@ -191,13 +192,13 @@ impl<'a> Accessor<'a> {
         self.width
     }
 
-    fn locate(&self, i: usize) -> (Option<Strided<'a>>, usize) {
+    fn locate(&self, i: usize) -> (Option<&Strided<'a>>, usize) {
         if let Some((numbers, values)) = &self.sparse
             && let Ok(at) = numbers.binary_search(&(i as u32))
         {
-            return (Some(*values), at);
+            return (Some(values), at);
         }
-        (self.dense, i)
+        (self.dense.as_ref(), i)
     }
 }
 

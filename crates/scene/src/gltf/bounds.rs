@@ -19,10 +19,16 @@ impl Bounds {
     /// Of all instances: boxes of the moved boxes of their meshes.
     pub(super) fn of(parts: &SceneParts) -> Self {
         let meshes: Vec<Self> = (parts.meshes.iter())
-            .map(|mesh| mesh.positions.iter().fold(Self::EMPTY, |b, &p| b.with(p)))
+            .map(|mesh| {
+                let [min, max] = mesh.bounds();
+                Self { min, max }
+            })
             .collect();
         parts.instances.iter().fold(Self::EMPTY, |all, instance| {
             let local = meshes[instance.mesh as usize];
+            if local.is_empty() {
+                return all;
+            }
             (0..8).fold(all, |all, corner| {
                 let pick = |bit: usize| if corner >> bit & 1 == 0 { local.min } else { local.max };
                 let corner = Vec3::new(pick(0).x, pick(1).y, pick(2).z);

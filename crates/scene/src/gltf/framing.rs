@@ -1,7 +1,7 @@
 //! A camera for a file that has none.
 
 use super::bounds::Bounds;
-use crate::{Camera, SceneParts};
+use crate::{Camera, Mesh, SceneParts};
 use glam::{Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -77,7 +77,10 @@ fn probe(parts: &SceneParts, origin: Vec3, directions: &[Vec3]) -> Vec<Probe> {
     ];
     let mut left = MAX_TRIANGLES;
     for instance in &parts.instances {
-        let mesh = &parts.meshes[instance.mesh as usize];
+        if left == 0 {
+            break;
+        }
+        let mesh: &Mesh = &parts.meshes[instance.mesh as usize];
         let mirrored = instance.world_from_local.matrix3.determinant() < 0.0;
         for i in 0..mesh.len().min(left) {
             let corners = mesh

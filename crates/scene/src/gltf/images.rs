@@ -165,7 +165,7 @@ fn encoded(source: &Source, index: usize) -> Result<Vec<u8>, SceneError> {
     let label = label(source, index);
     match (&image.uri, image.buffer_view) {
         (Some(uri), _) => source.resolve(uri, &label),
-        (None, Some(view)) => Ok(source.view(view, &label)?.to_vec()),
+        (None, Some(view)) => Ok(source.view(view, &label)?.into_owned()),
         (None, None) => Err(source.invalid(label, "has neither URI nor bufferView", "export the file again")),
     }
 }

@@ -8,6 +8,7 @@ mod accessor;
 mod bounds;
 mod cameras;
 mod census;
+mod deferred;
 mod framing;
 mod geometry;
 mod images;
@@ -21,25 +22,40 @@ mod tangents;
 #[cfg(test)]
 mod tests;
 
-use crate::{Instance, Mesh, SceneError, SceneParts};
+use crate::{Instance, Material, Mesh, SceneError, SceneParts, StoredMesh};
 use bounds::Bounds;
 use geometry::{Budget, mesh_name};
 use json::Instancing;
+use materials::Needs;
 use merge::{Motion, append};
 use nodes::Placed;
 use source::Source;
 use std::path::Path;
+use std::sync::Arc;
 
 /// Triangles that placing a mesh again may add to the static mesh; beyond that, the mesh is instanced. Higher values make
 /// rays cheaper, lower values save memory.
 const MAX_COPIED_TRIANGLES: usize = 20_000;
 
-/// Reads a `.gltf` or `.glb` file.
+/// Bytes up to which a binary file is read as a whole. Larger ones stay on the disk, and so do their meshes, each until a ray first comes near
+/// it: what is never seen takes neither time nor memory, but is not checked either. Lower values save memory; higher values trace small scenes
+/// faster, because what is placed once has one tree then.
+const MAX_WHOLE: u64 = 64 << 20;
+
+/// Reads a `.gltf` or `.glb` file. A mesh of a large file may be read later, see [`crate::StoredMesh`].
 ///
 /// # Errors
 /// [`SceneError`], naming file, place and remedy.
 pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
-    let source = Source::open(path)?;
+    read_above(path, MAX_WHOLE)
+}
+
+/// [`read`], leaving the larger meshes of binary files of more than `max_whole` bytes where they are until they are needed.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn read_above(path: &Path, max_whole: u64) -> Result<SceneParts, SceneError> {
+    let source = Arc::new(Source::open(path, max_whole)?);
     let mut parts = SceneParts {
         name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
         ..SceneParts::default()
@@ -67,9 +83,19 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
         parts.materials.pop();
     }
 
+    let needs: Arc<[Needs]> = needs.into();
     for (index, placements) in placements.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
-        let mesh = geometry::read_mesh(&source, index, &needs, &mut budget, &mut report)?;
-        place(&source, mesh, placements, &mut parts, &mut budget)?;
+        let emits = |material: usize| parts.materials.get(material).is_some_and(Material::emits);
+        let later = match source.on_disk() {
+            true => deferred::mesh(&source, index, &needs, emits, &mut budget)?,
+            false => None,
+        };
+        let mesh = match later {
+            Some(mesh) => mesh,
+            None => geometry::read_mesh(&source, index, &needs, &mut budget, &mut report)?.into(),
+        };
+        let name = mesh_name(index, &source.json.meshes[index]);
+        place(&source, mesh, &name, placements, &mut parts, &mut budget)?;
     }
     finish_static_mesh(&mut parts);
 
@@ -82,7 +108,7 @@ pub fn read(path: &Path) -> Result<SceneParts, SceneError> {
     parts.cameras = cameras::read(&source, &placed, &parts, &bounds, &mut report)?;
     source.check_unchanged()?;
     parts.report = report;
-    remark(&mut parts);
+    remark(&mut parts, needs.iter().any(|needs| needs.tangents_for.is_some()));
     Ok(parts)
 }
 
@@ -136,7 +162,8 @@ fn used_materials(source: &Source, placements: &[Vec<Placed>]) -> Result<Vec<boo
 /// Puts a mesh where it stands: copied into the static mesh 0, or, where the copies would be large, as instances.
 fn place(
     source: &Source,
-    mesh: Mesh,
+    mesh: StoredMesh,
+    name: &str,
     placements: &[Placed],
     parts: &mut SceneParts,
     budget: &mut Budget,
@@ -145,18 +172,18 @@ fn place(
         return Ok(());
     }
     if parts.meshes.is_empty() {
-        parts.meshes.push(Mesh::default());
+        parts.meshes.push(StoredMesh::default());
     }
-    let shared = (placements.len() - 1).saturating_mul(mesh.len()) > MAX_COPIED_TRIANGLES;
+    let shared = mesh.is_deferred() || (placements.len() - 1).saturating_mul(mesh.len()) > MAX_COPIED_TRIANGLES;
     let local = parts.meshes.len() as u32;
     let mut last_origin = None;
     let mut instanced = false;
     for placement in placements {
         if last_origin != Some(placement.node) {
             last_origin = Some(placement.node);
-            let name = source.json.nodes[placement.node].name.clone();
-            let node = name.unwrap_or_else(|| format!("node {}", placement.node));
-            parts.origins.push((node, mesh.name.clone()));
+            let node = source.json.nodes[placement.node].name.clone();
+            let node = node.unwrap_or_else(|| format!("node {}", placement.node));
+            parts.origins.push((node, name.to_owned()));
         }
         let origin = parts.origins.len() as u32 - 1;
         let motion = Motion::new(placement.world);
@@ -191,20 +218,27 @@ fn finish_static_mesh(parts: &mut SceneParts) {
 }
 
 /// Notes what is odd about the whole, and what is not there.
-fn remark(parts: &mut SceneParts) {
-    let degenerate: usize = parts.meshes.iter().map(zero_area_triangles).sum();
+fn remark(parts: &mut SceneParts, mapped: bool) {
+    let read = || parts.meshes.iter().filter(|mesh| !mesh.is_deferred());
+    let degenerate: usize = read().map(|mesh| zero_area_triangles(mesh)).sum();
     let report = &mut parts.report;
+    let later = parts.meshes.len() - read().count();
+    if later > 0 {
+        report.skipped.push(format!(
+            "{later} meshes stay in the file until a ray comes near them: not read, not checked"
+        ));
+    }
     if degenerate > 0 {
         report.warn(format!("{degenerate} triangles have no area: no ray meets them"));
     }
     if parts.instances.is_empty() {
         report.warn("the scene has no triangles: the image will be black");
     }
-    let emitting = |mesh: &Mesh| mesh.materials.iter().any(|&m| parts.materials[m as usize].emits());
-    if parts.punctual.is_empty() && !parts.meshes.iter().any(emitting) {
+    let emitting = |mesh: &StoredMesh| mesh.materials.iter().any(|&m| parts.materials[m as usize].emits());
+    if parts.punctual.is_empty() && !read().any(emitting) {
         report.warn("the scene has no lights: the image will be black");
     }
-    if !parts.textures.is_empty() && parts.meshes.iter().all(|mesh| mesh.tangents.is_empty()) {
+    if !parts.textures.is_empty() && !mapped {
         report.skipped.push("no normal maps: no tangents".into());
     }
 }

@@ -1,9 +1,11 @@
-//! The file and what lies beside it: container, JSON, buffers, data URIs.
+//! The file and what lies beside it: container, JSON, buffers, data URIs. The binary chunk of a large file stays on the disk.
 
 use super::json::{self, Index, Root, View};
 use crate::SceneError;
+use std::borrow::Cow;
 use std::fs::{File, Metadata};
-use std::io::Read;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
@@ -16,11 +18,67 @@ pub(super) struct Source {
     pub(super) json: Root,
     /// One entry per buffer of the JSON, each exactly `byteLength` long; `None` for one whose bytes come from nowhere,
     /// which is no error until something reads it.
-    buffers: Vec<Option<Vec<u8>>>,
+    buffers: Vec<Option<Buffer>>,
     /// Bytes read so far: what the sizes of everything made from the file are measured by.
     pub(super) bytes: u64,
     /// All files read so far, as they were then.
     seen: Mutex<Vec<Seen>>,
+}
+
+/// The bytes of a buffer.
+#[derive(Debug)]
+enum Buffer {
+    Memory(Vec<u8>),
+    /// A part of a file, read piece by piece. Not mapped into memory: another program that shortens the file would end this one.
+    Disk {
+        file: Mutex<File>,
+        part: Range<u64>,
+    },
+}
+
+impl Buffer {
+    fn len(&self) -> u64 {
+        match self {
+            Self::Memory(bytes) => bytes.len() as u64,
+            Self::Disk { part, .. } => part.end - part.start,
+        }
+    }
+
+    fn truncate(&mut self, length: u64) {
+        match self {
+            Self::Memory(bytes) => bytes.truncate(length as usize),
+            Self::Disk { part, .. } => part.end = part.end.min(part.start.saturating_add(length)),
+        }
+    }
+
+    /// A part of it, which lies within.
+    fn part(self, range: Range<u64>) -> Self {
+        match self {
+            Self::Memory(mut bytes) => {
+                bytes.truncate(range.end as usize);
+                bytes.drain(..range.start as usize);
+                Self::Memory(bytes)
+            }
+            Self::Disk { file, part } => Self::Disk {
+                file,
+                part: part.start + range.start..part.start + range.end,
+            },
+        }
+    }
+
+    /// Bytes within the buffer.
+    fn range(&self, range: Range<u64>) -> io::Result<Cow<'_, [u8]>> {
+        match self {
+            Self::Memory(bytes) => Ok(bytes[range.start as usize..range.end as usize].into()),
+            Self::Disk { file, part } => {
+                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut bytes = vec![0; (range.end - range.start) as usize];
+                file.seek(SeekFrom::Start(part.start + range.start))?;
+                file.read_exact(&mut bytes)?;
+                Ok(bytes.into())
+            }
+        }
+    }
 }
 
 /// A file as it was when it was read.
@@ -50,18 +108,18 @@ impl Seen {
 }
 
 impl Source {
-    /// Reads `path` and its buffers.
+    /// Reads `path` and its buffers; the binary chunk of a `.glb` of more than `max_whole` bytes is read when it is asked for.
     ///
     /// # Errors
     /// [`SceneError::Read`] for a missing file or buffer, [`SceneError::Invalid`] for what is not glTF 2.0 or requires an
     /// unsupported extension.
-    pub(super) fn open(path: &Path) -> Result<Self, SceneError> {
-        let (file, seen) = read_file(path, path, "scene")?;
-        let bytes = file.len() as u64;
-        let (text, blob) = split(path, &file)?;
+    pub(super) fn open(path: &Path, max_whole: u64) -> Result<Self, SceneError> {
+        let opened = Opened::new(path, max_whole)?;
+        let bytes = opened.buffer.len();
+        let (text, blob) = split(path, &opened.buffer)?;
+        let json = opened.buffer.range(text).map_err(|error| unreadable(path, error))?;
         // A byte order mark is not allowed, but some editors leave one.
-        let text = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text);
-        let json: Root = json::parse(text).map_err(|error| {
+        let json = json::parse(json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json)).map_err(|error| {
             invalid(
                 path,
                 "JSON",
@@ -74,13 +132,21 @@ impl Source {
             json,
             buffers: Vec::new(),
             bytes,
-            seen: Mutex::new(vec![seen]),
+            seen: Mutex::new(vec![opened.seen]),
         };
         source.check_version()?;
         // First, because extensions for compression leave buffers out.
         super::census::refuse_required(&source)?;
-        source.read_buffers(blob)?;
+        source.read_buffers(opened.buffer, blob)?;
         Ok(source)
+    }
+
+    /// Whether there are bytes that have stayed on the disk.
+    pub(super) fn on_disk(&self) -> bool {
+        self.buffers
+            .iter()
+            .flatten()
+            .any(|buffer| matches!(buffer, Buffer::Disk { .. }))
     }
 
     /// Shorthand for [`SceneError::Invalid`] about this file.
@@ -103,7 +169,26 @@ impl Source {
     }
 
     /// The bytes of a buffer view.
-    pub(super) fn view(&self, index: Index<View>, place: &str) -> Result<&[u8], SceneError> {
+    pub(super) fn view(&self, index: Index<View>, place: &str) -> Result<Cow<'_, [u8]>, SceneError> {
+        let length = self.view_length(index, place)?;
+        self.range(index, 0..length, place)
+    }
+
+    /// The length of a buffer view, all of which is there.
+    pub(super) fn view_length(&self, index: Index<View>, place: &str) -> Result<u64, SceneError> {
+        self.locate(index, place).map(|(_, range)| range.end - range.start)
+    }
+
+    /// Bytes of a buffer view, within its length.
+    pub(super) fn range(&self, index: Index<View>, part: Range<u64>, place: &str) -> Result<Cow<'_, [u8]>, SceneError> {
+        let (buffer, range) = self.locate(index, place)?;
+        buffer
+            .range(range.start + part.start..range.start + part.end)
+            .map_err(|error| unreadable(&self.path, error))
+    }
+
+    /// Where the bytes of a buffer view are.
+    fn locate(&self, index: Index<View>, place: &str) -> Result<(&Buffer, Range<u64>), SceneError> {
         let (views, index) = (&self.json.buffer_views, index.value());
         let view = views
             .get(index)
@@ -124,11 +209,8 @@ impl Source {
                 "export the file again, with its buffers",
             ));
         };
-        let range = usize::try_from(offset)
-            .ok()
-            .zip(usize::try_from(length).ok())
-            .and_then(|(start, length)| Some(start..start.checked_add(length)?));
-        range.and_then(|range| buffer.get(range)).ok_or_else(|| {
+        let end = offset.checked_add(length).filter(|&end| end <= buffer.len());
+        end.map(|end| (buffer, offset..end)).ok_or_else(|| {
             self.invalid(
                 format!("bufferView {index}"),
                 format!(
@@ -201,19 +283,21 @@ impl Source {
         }
     }
 
-    fn read_buffers(&mut self, blob: Option<&[u8]>) -> Result<(), SceneError> {
+    /// Reads all buffers; the first may be the part `blob` of the file itself.
+    fn read_buffers(&mut self, file: Buffer, blob: Option<Range<u64>>) -> Result<(), SceneError> {
+        let mut blob = blob.map(|blob| file.part(blob));
         for index in 0..self.json.buffers.len() {
             let buffer = &self.json.buffers[index];
             let (place, length) = (format!("buffer {index}"), buffer.byte_length.0);
-            let mut data = match (&buffer.uri, index, blob) {
-                (Some(uri), _, _) => self.resolve(uri, &place)?,
-                (None, 0, Some(blob)) => blob.to_vec(),
+            let mut data = match (&buffer.uri, index, blob.take()) {
+                (Some(uri), _, _) => Buffer::Memory(self.resolve(uri, &place)?),
+                (None, 0, Some(blob)) => blob,
                 (None, _, _) => {
                     self.buffers.push(None);
                     continue;
                 }
             };
-            if (data.len() as u64) < length {
+            if data.len() < length {
                 return Err(self.invalid(
                     place,
                     format!("claims {length} bytes, but there are {}", data.len()),
@@ -221,9 +305,9 @@ impl Source {
                 ));
             }
             if buffer.uri.as_deref().is_some_and(|uri| !uri.starts_with("data:")) {
-                self.bytes += data.len() as u64;
+                self.bytes += data.len();
             }
-            data.truncate(length as usize);
+            data.truncate(length);
             self.buffers.push(Some(data));
         }
         Ok(())
@@ -239,38 +323,86 @@ fn invalid(path: &Path, place: impl Into<String>, problem: impl Into<String>, re
     }
 }
 
-/// Reads `file`; errors about a part name `scene` too. Only regular files: a URI must not make us wait for a pipe or
-/// read a device without end.
-fn read_file(scene: &Path, file: &Path, what: &str) -> Result<(Vec<u8>, Seen), SceneError> {
-    let error = |source: std::io::Error| SceneError::Read {
-        path: file.into(),
-        what: if scene == file {
-            what.into()
-        } else {
-            format!("{what} of {}", scene.display())
-        },
+fn unreadable(path: &Path, source: io::Error) -> SceneError {
+    SceneError::Read {
+        path: path.into(),
+        what: "scene".into(),
         source,
-    };
-    let metadata = std::fs::metadata(file).map_err(error)?;
-    if !metadata.is_file() {
-        return Err(error(std::io::Error::other("not a regular file")));
     }
-    // Of the file that is opened, which may be another by now.
+}
+
+/// A file that is open, as it was then.
+struct Opened {
+    buffer: Buffer,
+    seen: Seen,
+}
+
+impl Opened {
+    /// Opens the scene, and reads it if it is not binary, or has `max_whole` bytes at most.
+    fn new(path: &Path, max_whole: u64) -> Result<Self, SceneError> {
+        let (mut file, seen) = open_file(path).map_err(|error| unreadable(path, error))?;
+        let mut read = || {
+            let mut magic = [0; 4];
+            if seen.len > max_whole && file.read_exact(&mut magic).is_ok() && magic == *MAGIC {
+                return Ok(None);
+            }
+            file.rewind()?;
+            let mut bytes = Vec::new();
+            file.read_to_end(&mut bytes).map(|_| Some(bytes))
+        };
+        let buffer = match read().map_err(|error: io::Error| unreadable(path, error))? {
+            Some(bytes) => Buffer::Memory(bytes),
+            None => Buffer::Disk {
+                file: file.into(),
+                part: 0..seen.len,
+            },
+        };
+        Ok(Self { buffer, seen })
+    }
+}
+
+/// Reads `file`, which is wanted as a part of `scene`.
+fn read_file(scene: &Path, file: &Path, what: &str) -> Result<(Vec<u8>, Seen), SceneError> {
     let read = || {
-        let mut opened = File::open(file)?;
-        let seen = Seen::new(file, &opened.metadata()?);
+        let (mut opened, seen) = open_file(file)?;
         let mut bytes = Vec::new();
         opened.read_to_end(&mut bytes)?;
         Ok((bytes, seen))
     };
-    read().map_err(error)
+    read().map_err(|source| SceneError::Read {
+        path: file.into(),
+        what: format!("{what} of {}", scene.display()),
+        source,
+    })
 }
 
-/// Splits a file into JSON and binary chunk (glTF 2.0 section 4.4); a file without the magic number is all JSON.
+/// Opens regular files only: a URI must not make us wait for a pipe or read a device without end.
+fn open_file(file: &Path) -> io::Result<(File, Seen)> {
+    if !std::fs::metadata(file)?.is_file() {
+        return Err(io::Error::other("not a regular file"));
+    }
+    // Of the file that is opened, which may be another by now.
+    let opened = File::open(file)?;
+    let seen = Seen::new(file, &opened.metadata()?);
+    Ok((opened, seen))
+}
+
+/// How binary files begin.
+const MAGIC: &[u8; 4] = b"glTF";
+
+/// Where JSON and binary chunk are in a file (glTF 2.0 section 4.4); a file without the magic number is all JSON.
 /// Not by `gltf::binary`, which refuses files with chunks of unknown types, and underflows on a length below 12.
-fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>), SceneError> {
-    if !file.starts_with(b"glTF") {
-        return Ok((file, None));
+fn split(path: &Path, file: &Buffer) -> Result<(Range<u64>, Option<Range<u64>>), SceneError> {
+    let word = |at: u64| -> Result<Option<[u8; 4]>, SceneError> {
+        if at.saturating_add(4) > file.len() {
+            return Ok(None);
+        }
+        let bytes = file.range(at..at + 4).map_err(|error| unreadable(path, error))?;
+        Ok(Some((*bytes).try_into().expect("four bytes")))
+    };
+    let number = |at: u64| Ok(word(at)?.map(u32::from_le_bytes));
+    if word(0)? != Some(*MAGIC) {
+        return Ok((0..file.len(), None));
     }
     let damaged = |problem: String| {
         invalid(
@@ -280,11 +412,7 @@ fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)
             "the file is damaged: copy or export it again",
         )
     };
-    let word = |at: usize| -> Option<u32> {
-        let bytes = file.get(at..at + 4)?;
-        Some(u32::from_le_bytes(bytes.try_into().expect("four bytes")))
-    };
-    let (Some(version), Some(length)) = (word(4), word(8)) else {
+    let (Some(version), Some(length)) = (number(4)?, number(8)?) else {
         return Err(damaged(format!("the header is cut short at {} bytes", file.len())));
     };
     if version != 2 {
@@ -295,28 +423,29 @@ fn split<'a>(path: &Path, file: &'a [u8]) -> Result<(&'a [u8], Option<&'a [u8]>)
             "export the file as glTF 2.0",
         ));
     }
-    if length as usize > file.len() {
+    if u64::from(length) > file.len() {
         return Err(damaged(format!(
             "claims {length} bytes, but the file has {}",
             file.len()
         )));
     }
     let (mut at, mut json, mut blob) = (12, None, None);
-    while let (Some(size), Some(kind)) = (word(at), word(at + 4)) {
-        let start = at + 8;
-        let chunk = file.get(start..start + size as usize).ok_or_else(|| {
-            damaged(format!(
-                "a chunk claims {size} bytes at {start}, but the file has {}",
+    while let (Some(size), Some(kind)) = (number(at)?, word(at + 4)?) {
+        let chunk = at + 8..at + 8 + u64::from(size);
+        if chunk.end > file.len() {
+            return Err(damaged(format!(
+                "a chunk claims {size} bytes at {}, but the file has {}",
+                chunk.start,
                 file.len()
-            ))
-        })?;
-        match &kind.to_le_bytes() {
+            )));
+        }
+        at = chunk.end;
+        match &kind {
             b"JSON" if json.is_none() => json = Some(chunk),
             b"BIN\0" if blob.is_none() => blob = Some(chunk),
             // Section 4.4.3.1: clients must ignore chunks with unknown types.
             _ => {}
         }
-        at = start + size as usize;
     }
     Ok((json.ok_or_else(|| damaged("there is no JSON chunk".into()))?, blob))
 }
@@ -389,14 +518,14 @@ mod tests {
         std::fs::write(at("a.gltf"), json).unwrap();
         std::fs::write(at("a.bin"), "1234").unwrap();
         for name in ["a.bin", "a.gltf"] {
-            let source = Source::open(&at("a.gltf")).unwrap();
+            let source = Source::open(&at("a.gltf"), u64::MAX).unwrap();
             source.check_unchanged().unwrap();
             let longer = std::fs::read_to_string(at(name)).unwrap() + " ";
             std::fs::write(at(name), longer).unwrap();
             let error = source.check_unchanged().unwrap_err().to_string();
             assert!(error.contains(name) && error.contains("changed"), "{error}");
         }
-        let source = Source::open(&at("a.gltf")).unwrap();
+        let source = Source::open(&at("a.gltf"), u64::MAX).unwrap();
         std::fs::remove_file(at("a.bin")).unwrap();
         assert!(source.check_unchanged().is_err());
     }

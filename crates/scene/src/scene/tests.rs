@@ -28,7 +28,7 @@ fn square(material: u32) -> Mesh {
 fn parts(materials: Vec<Material>, transforms: &[Affine3A]) -> SceneParts {
     SceneParts {
         name: "test".into(),
-        meshes: vec![square(0)],
+        meshes: vec![square(0).into()],
         instances: transforms.iter().map(|&t| Instance::new(0, 0, t).unwrap()).collect(),
         materials,
         origins: vec![("lamp".into(), "square".into())],
@@ -405,7 +405,7 @@ fn shading_normals_never_face_away() {
     }
     mesh.materials = vec![0; mesh.indices.len()];
     let mut parts = parts(vec![Material::lambert("grey", Vec3::splat(0.5))], &[Affine3A::IDENTITY]);
-    parts.meshes[0] = mesh;
+    parts.meshes[0] = mesh.into();
     let scene = Scene::new(parts).unwrap();
     let random = sampling::random::Random::new(1, 0, 0);
     let (mut smooth, mut bent) = (0, 0);

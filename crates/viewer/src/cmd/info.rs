@@ -7,6 +7,7 @@ use crate::session::{self, Loaded};
 use crate::{message, output, table};
 use anyhow::Result;
 use clap::Args;
+use glam::{BVec3, Vec3};
 use render::Method;
 use scene::{Light, LightKind, Scene, SceneParts, generate};
 use serde_json::json;
@@ -288,12 +289,25 @@ fn kinds(scene: &Scene) -> impl Iterator<Item = Kind> {
     all.map(kind).into_iter().filter(|kind| kind.count > 0)
 }
 
-/// The corners of the box around all geometry, world space, metres; zeros without geometry.
+/// The corners of the box around all geometry, world space, metres; zeros without geometry. Of a mesh that is still in its file it is the box that
+/// counts.
 fn bounds(parts: &SceneParts) -> [[f32; 3]; 2] {
     let mut low = [f32::INFINITY; 3];
     let mut high = [f32::NEG_INFINITY; 3];
     for instance in &parts.instances {
-        for &position in &parts.meshes[instance.mesh as usize].positions {
+        let mesh = &parts.meshes[instance.mesh as usize];
+        let of_box = || {
+            let [least, most] = mesh.bounds();
+            (0..8).map(move |corner| {
+                let pick = BVec3::from_array([1, 2, 4].map(|bit| corner & bit != 0));
+                Vec3::select(pick, most, least)
+            })
+        };
+        let positions: Box<dyn Iterator<Item = Vec3>> = match mesh.is_deferred() {
+            true => Box::new(of_box()),
+            false => Box::new(mesh.positions.iter().copied()),
+        };
+        for position in positions {
             let position = instance.world_from_local.transform_point3(position).to_array();
             for axis in 0..3 {
                 low[axis] = low[axis].min(position[axis]);

@@ -76,6 +76,9 @@ pub(crate) struct RenderArgs {
     /// Write all figures of the run as JSON ("-" for stdout)
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
+    /// Build everything before the first frame, also what no ray will touch: for measurements, the image is the same
+    #[arg(long)]
+    build_all: bool,
     #[command(flatten)]
     sequence: SequenceArgs,
     /// Show the image while it is made in tev, which listens at localhost:14158
@@ -175,7 +178,10 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     }
 
     session::use_threads(args.light.threads)?;
-    let loaded = session::load_with_warnings(&args.scene)?;
+    let mut loaded = session::load_with_warnings(&args.scene)?;
+    if args.build_all {
+        loaded.build_all();
+    }
     if let Some(sequence) = &sequence {
         return sequence::run(args, format, &settings, &loaded, sequence);
     }

@@ -18,7 +18,7 @@ use device::Device;
 use glam::{Vec2, Vec3};
 use light_cache::{SamplerKind, ShadingPoint};
 use render::image::{self, Channel};
-use render::{FrameLoop, Image, Method, Settings};
+use render::{FrameLoop, Image, Method, RenderError, Settings};
 use scene::{Camera, PrimitiveId, Ray, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -158,6 +158,8 @@ struct Stage {
     showing: Duration,
     /// Seconds of learning until the last frames, and in them.
     learned: [f64; 2],
+    /// A part of the scene could not be read, and that was told.
+    incomplete: bool,
 }
 
 impl Worker {
@@ -302,6 +304,7 @@ impl Worker {
             seconds: 0.0,
             showing: Duration::ZERO,
             learned: [0.0; 2],
+            incomplete: false,
         });
         Ok(())
     }
@@ -416,7 +419,13 @@ impl Worker {
             }
         }
         stage.frames.wait();
-        if let Some(error) = stage.frames.error() {
+        let error = stage.frames.error();
+        if let Some(RenderError::Scene(text)) = error {
+            // Beginning anew would not mend the file: told once, and shown without what is missing.
+            if !std::mem::replace(&mut stage.incomplete, true) {
+                (self.tell)(Report::Trouble(text));
+            }
+        } else if let Some(error) = error {
             self.device.give_up(&error.to_string(), &self.tell);
             if let Err(error) = self.begin_anew() {
                 (self.tell)(Report::Trouble(format!("{error:#}")));

@@ -55,6 +55,9 @@ pub(super) struct Stats {
     min_probability: f64,
     light_bytes: usize,
     bvh_bytes: usize,
+    /// Meshes whose trees some ray has needed.
+    meshes_built: usize,
+    meshes: usize,
     peak_rss_bytes: u64,
     skipped: Vec<String>,
     /// What must be said of results of this method, if anything: it is for research.
@@ -113,6 +116,8 @@ impl Stats {
             min_probability: sampler.min_probability,
             light_bytes: sampler.bytes,
             bvh_bytes: loaded.scene.bvh().bytes(),
+            meshes_built: loaded.scene.bvh().built(),
+            meshes: loaded.scene.parts.meshes.len(),
             peak_rss_bytes: machine::peak_rss_bytes(),
             skipped: skipped(&loaded.scene, run),
             research: settings.method.research_note(),

@@ -91,7 +91,7 @@ pub(super) const ALL: [Skip; 13] = [
         forced_by: "vertex normals that lean by 2e-6",
         applies: |_| true,
         skipped: unchanged,
-        forced: |parts, _| parts.meshes.iter_mut().for_each(lean),
+        forced: |parts, _| parts.meshes.iter_mut().for_each(|mesh| lean(mesh)),
     },
     Skip {
         name: "no glossy materials: lights are not looked for by reflection",
