@@ -9,7 +9,7 @@
 //! image is the mean of the blocks, and their weights are fixed beforehand: the number of frames, whatever the number of samples that a pixel has
 //! taken in them. Blocks weighed by their samples would have a little less variance, and be biased: a pixel whose first samples happened
 //! to agree takes few more, and so keeps them (D. Kirk and J. Arvo, "Unbiased sampling techniques for image synthesis", 1991; the same is known as
-//! bias of optional stopping).
+//! bias of optional stopping). Only when to stop is decided by the samples that count, in which every pixel has a share of one in as many as there are.
 
 use super::rates::Rate;
 use super::{Film, PixelRecord, Tile, luminance_of};
@@ -279,15 +279,12 @@ impl Film {
         let mut moments = Moments::default();
         rows.iter().for_each(|row| moments.push(part * row[0]));
         let relmse = moments.mean();
-        let t = match rows.len() {
-            1 => f64::INFINITY,
-            count => student_t_quantile(0.5 + 0.5 * CONFIDENCE, count - 1),
+        // Of a single pixel nothing is known but that its squared difference is a chi-square variable of one degree of freedom.
+        let standard_error = match rows.len() {
+            1 => relmse * std::f64::consts::SQRT_2,
+            _ => moments.standard_error(),
         };
-        let half_width = if relmse > 0.0 {
-            t * moments.standard_error()
-        } else {
-            0.0
-        };
+        let half_width = student_t_quantile(0.5 + 0.5 * CONFIDENCE, (rows.len() - 1).max(1)) * standard_error;
         Some(ErrorEstimate {
             relmse,
             low: (relmse - half_width).max(0.0),

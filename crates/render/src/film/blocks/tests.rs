@@ -111,6 +111,10 @@ fn the_error_is_estimated_with_an_interval_that_holds_it() {
     }
     assert!(held > 30, "{held} of 40");
     assert_eq!(rendered(16, 1, 8, |_, _, u| u).estimated_error(), None, "one block");
+    let error = rendered(1, 1, 50, |_, _, u| 1.0 + u)
+        .estimated_error()
+        .expect("two blocks");
+    assert!(error.low == 0.0 && error.high > 10.0 * error.relmse && error.high.is_finite());
 }
 
 #[test]
