@@ -101,9 +101,14 @@ fn names_and_folders_that_cannot_be_are_refused() {
     );
     refused(
         folder,
-        &render("demo:rooms:16", &["--until-relmse=0"]),
-        &["until-relmse"],
+        &render("demo:rooms:16", &["--target-error=0"]),
+        &["target-error"],
     );
+    let target = |more| render("demo:rooms:16", &["--target-error=0.01", more]);
+    refused(folder, &target("--shard=1/2"), &["--shard", "--target-error"]);
+    refused(folder, &target("--sampler=oracle"), &["oracle", "--target-error"]);
+    let part = ["render", "demo:rooms:16", "--target-error=0.01", "-o", "a.part"];
+    refused(folder, &part, &["--target-error", "joined"]);
 }
 
 #[test]
@@ -111,13 +116,26 @@ fn rendering_stops_when_the_image_is_good_enough() {
     let temporary = folder();
     let folder = temporary.path();
     let frames = |bound: &str| -> u64 {
-        let size = ["--width=24", "--height=16", "-o", "out.exr", "--stats=-"];
+        let size = [
+            "--width=24",
+            "--height=16",
+            "-o",
+            "out.exr",
+            "--aov=samples",
+            "--stats=-",
+        ];
         let arguments = [&["render", "demo:rooms:16", "--sampler=tree", bound], &size[..]].concat();
         let output = manylight(folder, &arguments);
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(stderr(&output).contains("95 % confidence"), "{}", stderr(&output));
         let stats: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        let target = stats["target_error"].as_f64().expect("a number");
+        assert!(stats["estimated_error"]["high"].as_f64() <= Some(target), "{stats}");
+        let samples = &stats["samples"];
+        assert!(samples["least"].as_u64() < samples["median"].as_u64(), "{samples}");
+        assert!(samples["median"].as_u64() < samples["most"].as_u64(), "{samples}");
         stats["spp"].as_u64().expect("a number")
     };
-    let (rough, fine) = (frames("--until-relmse=0.01"), frames("--until-relmse=0.001"));
+    let (rough, fine) = (frames("--target-error=0.01"), frames("--target-error=0.001"));
     assert!(rough >= 16 && fine > 4 * rough && fine < 100_000, "{rough} {fine}");
 }

@@ -40,6 +40,24 @@ fn a_rendering_goes_on_as_if_it_had_not_been_stopped() {
     }
 }
 
+/// Whatever the number of threads, and wherever it was cut: before, at and after the ends of blocks.
+#[test]
+fn samples_where_the_error_is_go_on_there() {
+    let temporary = folder();
+    let folder = temporary.path();
+    for sampler in ["adaptive", "tree"] {
+        let sampler = format!("--sampler={sampler}");
+        let target = ["--target-error=0.000001", "--aov=samples"];
+        let render = |more: &[&str]| render(folder, &[&target[..], &[&sampler], more].concat());
+        render(&["--spp=37", "--threads=2", "-o", "whole.exr"]);
+        for spp in ["--spp=7", "--spp=8", "--spp=16", "--spp=21", "--spp=37"] {
+            render(&[spp, "--threads=1", "--resume=state", "-o", "resumed.exr"]);
+        }
+        assert_eq!(pixels(folder, "resumed.exr"), pixels(folder, "whole.exr"), "{sampler}");
+        fs::remove_file(folder.join("state")).expect("it was kept");
+    }
+}
+
 #[test]
 fn states_of_something_else_are_refused() {
     let temporary = folder();

@@ -5,10 +5,16 @@
 //!
 //! A tile owns its pixels, so tiles are rendered in parallel without sharing, and a sample touches one cache line or two.
 
+mod blocks;
+mod rates;
 mod sound;
 
 use crate::RenderError;
+use crate::metric::EPSILON;
+use blocks::EarlierRecord;
+pub use blocks::{ErrorEstimate, SampleCounts};
 use glam::Vec3;
+use rates::Rate;
 use rayon::prelude::*;
 use scene::luminance;
 use serde::{Deserialize, Serialize};
@@ -16,6 +22,9 @@ use serde::{Deserialize, Serialize};
 /// Side of a tile in pixels. Higher values make neighbours share more of the caches; lower values balance the work of
 /// many threads better.
 pub const TILE_SIZE: u32 = 16;
+
+/// Most pixels of a tile, one for each value of a byte.
+const TILE_AREA: usize = (TILE_SIZE * TILE_SIZE) as usize;
 
 /// A finished image: linear RGB, Rec. 709 primaries, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,12 +86,12 @@ fn luminance_of(r: f64, g: f64, b: f64) -> f64 {
     0.2126 * r + 0.7152 * g + 0.0722 * b
 }
 
-/// Sums of one pixel.
+/// Sums of one pixel, in the current block.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 struct PixelRecord {
     /// R, G, B, luminance squared, each times the weight of its frame.
     sums: [f64; 4],
-    /// Samples in the sums: frames less those whose sample was not finite.
+    /// Samples in the sums; those that were not finite are not among them.
     count: u32,
     /// Sum of their weights.
     weight: f64,
@@ -119,7 +128,13 @@ pub(crate) struct Tile {
     pub(crate) height: u32,
     /// Weight of the samples that are being added.
     weight: f32,
+    /// Frames of the current block that are done.
+    block_frame: u32,
     pixels: Box<[PixelRecord]>,
+    /// Empty unless pixels take different numbers of samples.
+    earlier: Box<[EarlierRecord]>,
+    /// Likewise.
+    rates: Box<[Rate]>,
     /// Empty unless auxiliary images are kept.
     aovs: Box<[AovRecord]>,
 }
@@ -168,7 +183,14 @@ pub struct Film {
     frames: u64,
     /// Sum of the frames' weights, and of their squares.
     weights: [f64; 2],
+    /// The same of the blocks before the current one, see `blocks`.
+    earlier_weights: [f64; 2],
+    /// Frames in those.
+    block_start: u64,
+    /// (Pixel, frame) in those without a sample.
+    skipped: u64,
     has_aovs: bool,
+    has_rates: bool,
     tiles: Vec<Tile>,
 }
 
@@ -196,7 +218,10 @@ impl Film {
                     width: w,
                     height: h,
                     weight: 1.0,
+                    block_frame: 0,
                     pixels: vec![PixelRecord::default(); len].into(),
+                    earlier: Box::default(),
+                    rates: Box::default(),
                     aovs: vec![AovRecord::EMPTY; if aovs { len } else { 0 }].into(),
                 }
             })
@@ -206,7 +231,11 @@ impl Film {
             height,
             frames: 0,
             weights: [0.0; 2],
+            earlier_weights: [0.0; 2],
+            block_start: 0,
+            skipped: 0,
             has_aovs: aovs,
+            has_rates: false,
             tiles,
         }
     }
@@ -242,11 +271,14 @@ impl Film {
         self.tiles.iter_mut().for_each(|tile| tile.weight = weight);
     }
 
-    /// Counts one more sample in every pixel.
+    /// Counts one more frame.
     pub(crate) fn advance(&mut self) {
         let weight = f64::from(self.tiles[0].weight);
         self.weights = [self.weights[0] + weight, self.weights[1] + weight * weight];
         self.frames += 1;
+        self.tiles
+            .iter_mut()
+            .for_each(|tile| tile.block_frame = tile.block_frame.wrapping_add(1));
     }
 
     /// Adds a frame of `weight` (finite, above 0), whose samples are `radiance(x, y)`. Returns how many were not finite and were left out.
@@ -265,18 +297,23 @@ impl Film {
 
     /// Whether the film has the size of `other`, and the same layers.
     pub(crate) fn is_like(&self, other: &Self) -> bool {
-        let shape = |film: &Self| (film.width, film.height, film.has_aovs);
+        let shape = |film: &Self| (film.width, film.height, film.has_aovs, film.has_rates);
         shape(self) == shape(other)
     }
 
     /// Adds all samples of `other`: the mean image becomes that of both, each weighed as its frames are.
     ///
     /// # Errors
-    /// [`RenderError::State`] if the films differ in size or layers.
+    /// [`RenderError::State`] if the films differ in size or layers, or their pixels take samples where the error is.
     pub fn merge(&mut self, other: &Self) -> Result<(), RenderError> {
         if !self.is_like(other) {
             return Err(RenderError::State {
                 what: "films of different sizes or layers cannot be joined".into(),
+            });
+        }
+        if self.has_rates {
+            return Err(RenderError::State {
+                what: "films whose pixels take different numbers of samples cannot be joined".into(),
             });
         }
         self.frames = self.frames.saturating_add(other.frames);
@@ -323,10 +360,8 @@ impl Film {
     /// The mean image so far; black before the first frame.
     pub fn image(&self) -> Image {
         self.to_image(|tile, i| {
-            let pixel = &tile.pixels[i];
-            let scale = if pixel.count > 0 { 1.0 / pixel.weight } else { 0.0 };
-            let [r, g, b, _] = pixel.sums;
-            [r, g, b].map(|sum| (sum * scale) as f32)
+            let [r, g, b, _] = self.mean(tile, i).values;
+            [r, g, b].map(|value| value as f32)
         })
     }
 
@@ -339,18 +374,7 @@ impl Film {
     }
 
     fn variances(&self) -> Vec<f64> {
-        // 1 / n for n frames that weigh the same.
-        let share = self.weights[1] / (self.weights[0] * self.weights[0]);
-        self.to_rows(0.0, |tile, i| {
-            let pixel = &tile.pixels[i];
-            if pixel.count < 2 {
-                return 0.0;
-            }
-            let [r, g, b, y_sq] = pixel.sums.map(|sum| sum / pixel.weight);
-            let mean = luminance_of(r, g, b);
-            // Rounding may take the difference of two nearly equal squares below zero.
-            ((y_sq - mean * mean) * share / (1.0 - share)).max(0.0)
-        })
+        self.to_rows(0.0, |tile, i| self.mean(tile, i).variance())
     }
 
     /// The relMSE that the image is estimated to have, from the variances of its own pixels: the mean of variance / (Y^2 + 0.01 mean(Y)^2), Y being
@@ -364,7 +388,7 @@ impl Film {
         let luminance = |pixel: &[f32; 3]| f64::from(luminance(Vec3::from(*pixel)));
         let count = image.pixels.len() as f64;
         let mean = image.pixels.iter().map(luminance).sum::<f64>() / count;
-        let offset = 0.01 * mean * mean;
+        let offset = EPSILON * mean * mean;
         if offset <= 0.0 {
             // Black all over: nothing has varied.
             return 0.0;
@@ -377,7 +401,7 @@ impl Film {
             / count
     }
 
-    /// Samples per pixel so far.
+    /// Frames so far: samples per pixel, or, where pixels take different numbers of them, about their mean.
     pub fn spp(&self) -> u64 {
         self.frames
     }
@@ -439,147 +463,4 @@ impl Film {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A pixel that is 0 or 2 by turns has variance n / (n - 1) of a sample, and 1 / (n - 1) of the mean, which is 1.
-    #[test]
-    fn the_error_is_estimated_from_the_variances() {
-        let film = filled(20, 9, 101, |frame, x, _| {
-            Vec3::splat(if (frame + x) % 2 == 0 { 0.0 } else { 2.0 })
-        });
-        assert!(
-            (film.estimated_relmse() - 0.01 / 1.01).abs() < 1e-3,
-            "{}",
-            film.estimated_relmse()
-        );
-        assert_eq!(filled(4, 4, 1, |_, _, _| Vec3::ONE).estimated_relmse(), f64::INFINITY);
-        assert_eq!(filled(4, 4, 9, |_, _, _| Vec3::ZERO).estimated_relmse(), 0.0);
-    }
-
-    /// Adds `sample(frame, x, y)` to every pixel, `frames` times.
-    fn filled(width: u32, height: u32, frames: u32, sample: impl Fn(u32, u32, u32) -> Vec3) -> Film {
-        let mut film = Film::new(width, height, false);
-        for frame in 0..frames {
-            film.add_frame(1.0, |x, y| sample(frame, x, y));
-        }
-        film
-    }
-
-    #[test]
-    fn every_pixel_lands_in_its_row_and_column() {
-        let film = filled(37, 19, 1, |_, x, y| Vec3::new(x as f32, y as f32, 1.0));
-        let image = film.image();
-        assert_eq!((image.width, image.height, image.pixels.len()), (37, 19, 37 * 19));
-        for (i, pixel) in image.pixels.iter().enumerate() {
-            assert_eq!(*pixel, [(i % 37) as f32, (i / 37) as f32, 1.0]);
-        }
-    }
-
-    #[test]
-    fn sums_stay_exact_where_plain_float_sums_stop_growing() {
-        // 2^24 is where adding 1 to an f32 sum no longer changes it.
-        let mut film = Film::new(1, 1, false);
-        let tile = &mut film.tiles_mut()[0];
-        tile.add(0, Vec3::splat(16_777_216.0));
-        for _ in 0..10_000 {
-            tile.add(0, Vec3::ONE);
-        }
-        let mean = f64::from(film.image().pixels[0][0]);
-        let expected = (16_777_216.0 + 10_000.0) / 10_001.0;
-        assert!((mean / expected - 1.0).abs() < 1e-7, "{mean} against {expected}");
-    }
-
-    #[test]
-    fn variance_is_that_of_the_mean_and_never_negative() {
-        // Luminances 0, 1, 2, 3: sample variance 5/3, of the mean 5/12.
-        let film = filled(3, 3, 4, |frame, _, _| Vec3::splat(frame as f32));
-        for v in film.variance() {
-            assert!((v - 5.0 / 12.0).abs() < 1e-6, "{v}");
-        }
-        let constant = filled(3, 3, 100, |_, x, _| Vec3::splat(0.1 + x as f32 / 3.0));
-        for v in constant.variance() {
-            assert!((0.0..1e-9).contains(&v), "{v}");
-        }
-        assert_eq!(filled(2, 2, 1, |_, _, _| Vec3::ONE).variance(), vec![0.0; 4]);
-    }
-
-    #[test]
-    fn weighted_frames_make_a_weighted_mean_and_its_variance() {
-        let mut film = Film::new(1, 1, false);
-        for (weight, value) in [(0.25, 8.0), (1.0, 1.0), (1.0, 3.0)] {
-            film.set_weight(weight);
-            film.tiles_mut()[0].add(0, Vec3::splat(value));
-            film.advance();
-        }
-        let mean = 6.0 / 2.25;
-        assert!((film.image().pixels[0][0] - mean).abs() < 1e-6);
-        let spread = (0.25 * 64.0 + 1.0 + 9.0) / 2.25 - mean * mean;
-        let share = (0.0625 + 2.0) / (2.25 * 2.25);
-        assert!((film.variance()[0] - spread * share / (1.0 - share)).abs() < 1e-5);
-        assert_eq!(film.spp(), 3);
-    }
-
-    #[test]
-    fn samples_that_are_not_finite_are_left_out() {
-        let mut film = Film::new(1, 1, false);
-        let tile = &mut film.tiles_mut()[0];
-        assert!(tile.add(0, Vec3::splat(2.0)));
-        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            assert!(!tile.add(0, Vec3::new(1.0, bad, 1.0)));
-        }
-        assert!(tile.add(0, Vec3::splat(4.0)));
-        assert_eq!(film.image().pixels, vec![[3.0; 3]]);
-    }
-
-    #[test]
-    fn every_finite_radiance_is_accumulated() {
-        for radiance in [f32::MIN_POSITIVE, 1e-30, 1e30, f32::MAX] {
-            let film = filled(1, 1, 100, |frame, _, _| {
-                Vec3::splat(if frame % 2 == 0 { 0.0 } else { radiance })
-            });
-            let expected = f64::from(radiance) / 2.0;
-            assert!(
-                (f64::from(film.image().pixels[0][0]) / expected - 1.0).abs() < 1e-6,
-                "{radiance}"
-            );
-            // Of samples that are 0 and `radiance` by turns, the variance of the mean is radiance^2 / 4 / 99.
-            let relative = film.variances()[0] * 99.0 / (expected * expected);
-            assert!((relative - 1.0).abs() < 1e-6, "{radiance}: {relative}");
-            assert!(film.variance()[0].is_finite());
-            assert!(film.estimated_relmse().is_finite());
-        }
-    }
-
-    #[test]
-    fn an_empty_film_is_black() {
-        let film = Film::new(20, 5, false);
-        assert_eq!(film.image().pixels, vec![[0.0; 3]; 100]);
-        assert_eq!(film.spp(), 0);
-        assert!(film.aovs().is_none());
-    }
-
-    #[test]
-    fn auxiliary_images_average_hits_and_mark_misses() {
-        let mut film = Film::new(2, 1, true);
-        let hit = AovSample {
-            albedo: Vec3::splat(0.5),
-            normal_ws: Vec3::Z,
-            position_ws: Vec3::new(1.0, 2.0, 3.0),
-            emitted: Vec3::splat(6.0),
-            depth: 4.0,
-            light: 7,
-        };
-        let tile = &mut film.tiles_mut()[0];
-        tile.add_aovs(0, &hit);
-        tile.add_aovs(0, &AovSample::NONE);
-        tile.add_aovs(1, &AovSample::NONE);
-        let aovs = film.aovs().expect("asked for");
-        assert_eq!(aovs.albedo.pixels[0], [0.25; 3]);
-        assert_eq!(aovs.normal.pixels[0], [0.0, 0.0, 0.5]);
-        assert_eq!(aovs.position.pixels[0], [1.0, 2.0, 3.0]);
-        assert_eq!(aovs.emitted.pixels, vec![[3.0; 3], [0.0; 3]]);
-        assert_eq!(aovs.depth, vec![4.0, f32::INFINITY]);
-        assert_eq!(aovs.light, vec![-1.0, -1.0]);
-    }
-}
+mod tests;

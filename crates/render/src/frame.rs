@@ -296,6 +296,9 @@ pub(crate) trait Frames: Send {
     /// learns nothing, and returns false.
     fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool);
 
+    /// Before frame number `frame`: from it on, random numbers must be independent of all before.
+    fn begin_sequence(&mut self, _frame: u32) {}
+
     /// What has been accumulated, if it is not all in `film`.
     fn film<'f>(&'f self, film: &'f Film) -> &'f Film {
         film
@@ -360,6 +363,7 @@ pub(crate) struct Rendering<'s, F> {
     eye: Eye<'s>,
     camera: Camera,
     aovs: bool,
+    adaptive_pixels: bool,
     frames: F,
     film: Film,
     counters: Counters,
@@ -395,8 +399,13 @@ impl<'s, F: Frames> Rendering<'s, F> {
             },
             camera: camera.clone(),
             aovs: settings.aovs,
+            adaptive_pixels: settings.adaptive_pixels,
             frames,
-            film: Film::new(settings.width, settings.height, settings.aovs),
+            film: empty_film(
+                (settings.width, settings.height),
+                settings.aovs,
+                settings.adaptive_pixels,
+            ),
             counters: Counters::default(),
             render_s: 0.0,
             light_build_s: 0.0,
@@ -407,6 +416,11 @@ impl<'s, F: Frames> Rendering<'s, F> {
     }
 }
 
+fn empty_film((width, height): (u32, u32), aovs: bool, rates: bool) -> Film {
+    let film = Film::new(width, height, aovs);
+    if rates { film.with_rates() } else { film }
+}
+
 /// Whether rays can meet any light.
 fn has_area_lights(scene: &Scene) -> bool {
     scene.lights.iter().any(|light| !light.is_delta())
@@ -415,6 +429,9 @@ fn has_area_lights(scene: &Scene) -> bool {
 impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     fn render_frame_unless(&mut self, stop: &AtomicBool) -> bool {
         let start = Instant::now();
+        if self.film.begin_block() {
+            self.frames.begin_sequence(self.eye.frame);
+        }
         let (counters, finished) = if self.aovs {
             self.frames.render::<true>(&self.eye, &mut self.film, stop)
         } else {
@@ -468,7 +485,8 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
     }
 
     fn restart(&mut self) {
-        self.film = Film::new(self.eye.image_width, self.eye.image_height, self.aovs);
+        let size = (self.eye.image_width, self.eye.image_height);
+        self.film = empty_film(size, self.aovs, self.adaptive_pixels);
     }
 
     fn set_camera(&mut self, camera: &Camera) {

@@ -26,7 +26,7 @@ pub mod settings;
 
 pub use choosing::Choosing;
 pub use error::{GpuFault, RenderError};
-pub use film::{Film, Image};
+pub use film::{ErrorEstimate, Film, Image, SampleCounts};
 pub use flip::flip;
 pub use frame::{FrameLoop, RenderStats, SceneRef, renderer};
 pub use metric::ImageError;

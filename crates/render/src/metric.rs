@@ -10,7 +10,7 @@ const TRIMMED_SHARE: f64 = 0.001;
 
 /// Regulariser of relative errors, as a share of the reference's mean (squared): keeps dark pixels from ruling, and
 /// does not depend on the scale of the scene.
-const EPSILON: f64 = 0.01;
+pub(crate) const EPSILON: f64 = 0.01;
 
 /// Errors on luminance over all pixels, as the field reports them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]

@@ -36,7 +36,7 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) mis: Option<Heuristic>,
     pub(crate) max_bounces: u32,
     pub(crate) seed: u64,
-    /// Number of the frame in its sequence of random numbers = sample number of every pixel.
+    /// Number of the frame in its sequence of random numbers = sample number of every pixel that takes one sample in each frame.
     pub(crate) frame: u32,
     /// Lights drawn at the first surface.
     pub(crate) light_samples: u32,
@@ -53,11 +53,11 @@ impl<D> FrameView<'_, D> {
         self
     }
 
-    /// The points of the sequence that the light samples of this frame take: together they are the first points of it,
-    /// stratified in every power of two, frame by frame and all frames together.
+    /// The points of the sequence that the light samples of sample number `sample` take: together they are the first points of it,
+    /// stratified in every power of two, sample by sample and all samples together.
     #[inline(always)]
-    fn light_sample_indices(&self) -> impl Iterator<Item = u32> + use<D> {
-        let first = self.frame.wrapping_mul(self.light_samples);
+    fn light_sample_indices(&self, sample: u32) -> impl Iterator<Item = u32> + use<D> {
+        let first = sample.wrapping_mul(self.light_samples);
         (0..self.light_samples).map(move |k| first.wrapping_add(k))
     }
 }
@@ -127,7 +127,7 @@ impl Probe for AovSample {
     }
 }
 
-/// One sample for every pixel of a tile. With `AOVS` the auxiliary images too.
+/// One frame of a tile: one sample for every pixel, or as many as its rate asks for. With `AOVS` the auxiliary images too.
 #[allow(unsafe_code, reason = "vector instructions")]
 pub(crate) fn render_tile<D: DirectLight, const AOVS: bool>(
     view: &FrameView<'_, D>,
@@ -140,10 +140,10 @@ pub(crate) fn render_tile<D: DirectLight, const AOVS: bool>(
         // the kernel in use.
         return unsafe { render_tile_avx2::<D, AOVS>(view, tile, log) };
     }
-    render_rows::<D, AOVS>(view, tile, log);
+    render_pixels::<D, AOVS>(view, tile, log);
 }
 
-/// [`render_rows`] with wider vectors.
+/// [`render_pixels`] with wider vectors.
 #[cfg(target_arch = "x86_64")]
 #[allow(unsafe_code, reason = "vector instructions")]
 #[target_feature(enable = "avx2,bmi1,bmi2,lzcnt")]
@@ -152,40 +152,58 @@ unsafe fn render_tile_avx2<D: DirectLight, const AOVS: bool>(
     tile: &mut Tile,
     log: &mut TileLog<'_>,
 ) {
-    render_rows::<D, AOVS>(view, tile, log);
+    render_pixels::<D, AOVS>(view, tile, log);
 }
 
 #[inline(always)]
-fn render_rows<D: DirectLight, const AOVS: bool>(view: &FrameView<'_, D>, tile: &mut Tile, log: &mut TileLog<'_>) {
-    for row in 0..tile.height {
-        for column in (0..tile.width).step_by(PACKET) {
-            let starts = Starts::new(view, tile.x0 + column, tile.y0 + row);
-            for i in 0..PACKET.min((tile.width - column) as usize) {
-                let start = starts.get(i);
-                let index = (row * tile.width + column) as usize + i;
-                let found = if AOVS {
-                    let mut aovs = AovSample::NONE;
-                    let found = path(view, &start, log, &mut aovs);
-                    tile.add_aovs(index, &aovs);
-                    found
-                } else {
-                    path(view, &start, log, &mut ())
-                };
-                let radiance = match log.controls.get_mut(index) {
-                    Some(control) => control.add(&found),
-                    None => found.radiance,
-                };
-                if !tile.add(index, radiance) {
-                    log.counters.nonfinite += 1;
-                }
+fn render_pixels<D: DirectLight, const AOVS: bool>(view: &FrameView<'_, D>, tile: &mut Tile, log: &mut TileLog<'_>) {
+    // Together those that take samples of the same number: they share the points of the sequence, and their eye rays are traced at once.
+    let work = tile.work(view.frame);
+    for (pixels, samples) in work.groups() {
+        for sample in samples {
+            for pixels in pixels.chunks(PACKET) {
+                render_packet::<D, AOVS>(view, tile, pixels, sample, log);
             }
         }
     }
 }
 
-/// Where the paths of neighbouring pixels begin: everything up to the first hit is done for all of them at once.
+/// Sample number `sample` of up to [`PACKET`] pixels of a tile, counted row by row.
+#[inline(always)]
+fn render_packet<D: DirectLight, const AOVS: bool>(
+    view: &FrameView<'_, D>,
+    tile: &mut Tile,
+    pixels: &[u8],
+    sample: u32,
+    log: &mut TileLog<'_>,
+) {
+    // The last packet may have room left: its first pixel again is of no use, and harmless.
+    let at = std::array::from_fn(|i| tile.place(*pixels.get(i).unwrap_or(&pixels[0])));
+    let starts = Starts::new(view, &at, sample);
+    for (i, &pixel) in pixels.iter().enumerate() {
+        let start = starts.get(i);
+        let found = if AOVS {
+            let mut aovs = AovSample::NONE;
+            let found = path(view, &start, log, &mut aovs);
+            tile.add_aovs(pixel.into(), &aovs);
+            found
+        } else {
+            path(view, &start, log, &mut ())
+        };
+        let radiance = match log.controls.get_mut(usize::from(pixel)) {
+            Some(control) => control.add(&found),
+            None => found.radiance,
+        };
+        if !tile.add(pixel.into(), radiance) {
+            log.counters.nonfinite += 1;
+        }
+    }
+}
+
+/// Where the paths of pixels close to each other begin: everything up to the first hit is done for all of them at once.
 pub(crate) struct Starts {
-    first_pixel: u32,
+    pixels: [u32; PACKET],
+    sample: u32,
     rays: Packet,
     hits: [Option<Hit>; PACKET],
     /// For each light sample by dimension: for the choice of a light, the point on it.
@@ -195,6 +213,7 @@ pub(crate) struct Starts {
 /// Where a path begins.
 pub(crate) struct Start {
     pixel: u32,
+    sample: u32,
     direction_ws: Vec3,
     hit: Option<Hit>,
     /// As many as there are light samples.
@@ -202,32 +221,35 @@ pub(crate) struct Start {
 }
 
 impl Starts {
-    /// In the pixels of row `y` from column `x` on. Those beyond the image's edge are of no use, and harmless.
+    /// In the pixels at these columns and rows. Those beyond the image's edge are of no use, and harmless.
     #[allow(
         clippy::needless_range_loop,
         reason = "pixels are the inner index of what the outer loop fills"
     )]
     #[inline(always)]
-    pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
-        let first_pixel = y * view.image_width + x;
+    pub(crate) fn new<D>(view: &FrameView<'_, D>, at: &[[u32; 2]; PACKET], sample: u32) -> Self {
         let sampler = view.pixel_sampler;
-        let in_pixel: [[u32; PACKET]; 2] = sampler.numbers(view.seed, [x, y], view.image_width, view.frame, 0);
+        let in_pixel: [[u32; PACKET]; 2] = sampler.numbers(view.seed, at, view.image_width, sample, 0);
         let mut light_numbers = [[[0; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize];
-        for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
-            *numbers = sampler.numbers(view.seed, [x, y], view.image_width, index, 2);
+        for (index, numbers) in view.light_sample_indices(sample).zip(&mut light_numbers) {
+            *numbers = sampler.numbers(view.seed, at, view.image_width, index, 2);
         }
         let mut rays = Packet {
             origin_ws: view.camera.origin_ws,
             directions_ws: [[0.0; PACKET]; 3],
         };
+        let mut pixels = [0; PACKET];
         for i in 0..PACKET {
-            let direction_ws = eye_direction_ws(view, x + i as u32, y, [in_pixel[0][i], in_pixel[1][i]]).to_array();
+            let [x, y] = at[i];
+            pixels[i] = y * view.image_width + x;
+            let direction_ws = eye_direction_ws(view, x, y, [in_pixel[0][i], in_pixel[1][i]]).to_array();
             for axis in 0..3 {
                 rays.directions_ws[axis][i] = direction_ws[axis];
             }
         }
         Self {
-            first_pixel,
+            pixels,
+            sample,
             hits: view.scene.nearest_of_packet(&rays),
             rays,
             light_numbers,
@@ -237,7 +259,8 @@ impl Starts {
     #[inline(always)]
     pub(crate) fn get(&self, i: usize) -> Start {
         Start {
-            pixel: self.first_pixel + i as u32,
+            pixel: self.pixels[i],
+            sample: self.sample,
             direction_ws: self.rays.direction_ws(i),
             hit: self.hits[i],
             light_numbers: self.light_numbers.map(|[choice, u, v]| LightNumbers {
@@ -253,10 +276,10 @@ impl Start {
     pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
         let pixel = y * view.image_width + x;
         let sampler = view.pixel_sampler;
-        let [[u], [v]] = sampler.numbers(view.seed, [x, y], view.image_width, view.frame, 0);
+        let [[u], [v]] = sampler.numbers(view.seed, &[[x, y]], view.image_width, view.frame, 0);
         let mut light_numbers = [LightNumbers::default(); MAX_LIGHT_SAMPLES as usize];
-        for (index, numbers) in view.light_sample_indices().zip(&mut light_numbers) {
-            let [[choice], [u], [v]] = sampler.numbers(view.seed, [x, y], view.image_width, index, 2);
+        for (index, numbers) in view.light_sample_indices(view.frame).zip(&mut light_numbers) {
+            let [[choice], [u], [v]] = sampler.numbers(view.seed, &[[x, y]], view.image_width, index, 2);
             *numbers = LightNumbers { choice, point: [u, v] };
         }
         let direction_ws = eye_direction_ws(view, x, y, [u, v]);
@@ -267,6 +290,7 @@ impl Start {
         };
         Self {
             pixel,
+            sample: view.frame,
             direction_ws,
             hit: view.scene.nearest(&ray, PrimitiveId::NONE),
             light_numbers,
@@ -358,7 +382,7 @@ pub(crate) fn path<D: DirectLight>(
         }
 
         // Russian roulette on the largest component: luminance would kill saturated blues with large weights.
-        let sequence = PixelSequence::new(view.seed, start.pixel, view.frame);
+        let sequence = PixelSequence::new(view.seed, start.pixel, start.sample);
         let numbers = sequence.vertex(bounce);
         let survival = throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
         let u = numbers.f32(5);

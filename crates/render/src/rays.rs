@@ -54,7 +54,8 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
     for tile in film.tiles_mut() {
         for y in tile.y0..tile.y0 + tile.height {
             for column in (0..tile.width).step_by(PACKET) {
-                let starts = Starts::new(&view, tile.x0 + column, y);
+                let at = std::array::from_fn(|i| [tile.x0 + column + i as u32, y]);
+                let starts = Starts::new(&view, &at, frame);
                 for i in 0..PACKET.min((tile.width - column) as usize) {
                     path(&view, &starts.get(i), &mut log, &mut rays);
                 }

@@ -162,6 +162,9 @@ pub struct Settings {
     /// (`dump`). Costs time; changes no image.
     #[serde(default)]
     pub record_lights: bool,
+    /// Whether pixels take samples where the error is, one per frame on average, instead of one each. Unbiased either way.
+    #[serde(default)]
+    pub adaptive_pixels: bool,
 }
 
 impl Default for Settings {
@@ -181,6 +184,7 @@ impl Default for Settings {
             light: light_cache::Settings::default(),
             aovs: false,
             record_lights: false,
+            adaptive_pixels: false,
         }
     }
 }
@@ -238,6 +242,12 @@ impl Settings {
             return refuse(
                 format!("oracle with max_bounces = {}", self.max_bounces),
                 "it knows what is best for direct light at the first hit only: max_bounces must be 0",
+            );
+        }
+        if self.method == Method::Oracle && self.adaptive_pixels {
+            return refuse(
+                "oracle with adaptive_pixels (--target-error)".into(),
+                "it takes one sample per pixel and frame: adaptive_pixels must be false",
             );
         }
         if !(1..=MAX_LIGHT_SAMPLES).contains(&self.light_samples) {
@@ -298,10 +308,13 @@ mod tests {
     fn settings_out_of_range_are_refused_with_the_range() {
         Settings::default().check().expect("the default is valid");
         type Spoil = fn(&mut Settings);
-        let odd: [(&str, Spoil); 11] = [
+        let odd: [(&str, Spoil); 12] = [
             ("0 x 720", |s| s.width = 0),
             ("1280 x 40000", |s| s.height = 40_000),
             ("max_bounces = 2", |s| (s.method, s.max_bounces) = (Method::Oracle, 2)),
+            ("adaptive_pixels", |s| {
+                (s.method, s.adaptive_pixels) = (Method::Oracle, true)
+            }),
             ("light_samples", |s| s.light_samples = 9),
             ("candidates", |s| s.candidates = 0),
             ("oracle_passes", |s| s.oracle_passes = 0),

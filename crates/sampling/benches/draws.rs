@@ -103,7 +103,10 @@ fn main() {
                 "place in the pixel, choice and point on the light for 8 pixels, {}",
                 sampler.name()
             ),
-            |i| sampler.numbers::<5, 8>(u64::from(i & 1), [i & 1023, 5], 1024, i >> 10, 0),
+            |i| {
+                let pixels = std::array::from_fn(|k| [(i & 1023) + k as u32, 5]);
+                sampler.numbers::<5, 8>(u64::from(i & 1), &pixels, 1024, i >> 10, 0)
+            },
         );
     }
     measure("counter-based number", |i| Random::new(seed, i >> 6, i & 63).u32(3));

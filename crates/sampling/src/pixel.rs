@@ -56,20 +56,20 @@ impl PixelSampler {
     }
 
     /// `D` dimensions of the first path vertex (see [`crate::sequence`]), from `first_dimension` on and at most up to dimension 7, for sample number
-    /// `sample` in `N` pixels of a row that follow each other, from column `x` of row `y` on, in an image `width` pixels wide: 32 bits after the point each.
+    /// `sample` in each of `N` pixels, given by column and row, in an image `width` pixels wide: 32 bits after the point each.
     // Inlined as far as the default goes, for callers with wider vectors than others have.
     #[inline(always)]
     pub fn numbers<const D: usize, const N: usize>(
         self,
         seed: u64,
-        [x, y]: [u32; 2],
+        pixels: &[[u32; 2]; N],
         width: u32,
         sample: u32,
         first_dimension: u32,
     ) -> [[u32; N]; D] {
         match self {
-            Self::Sobol => first_vertices(seed, y * width + x, sample, first_dimension),
-            _ => std::array::from_fn(|d| self.dimension(seed, [x, y], width, sample, first_dimension + d as u32)),
+            Self::Sobol => first_vertices(seed, &numbered(pixels, width), sample, first_dimension),
+            _ => std::array::from_fn(|d| self.dimension(seed, pixels, width, sample, first_dimension + d as u32)),
         }
     }
 
@@ -78,19 +78,20 @@ impl PixelSampler {
     fn dimension<const N: usize>(
         self,
         seed: u64,
-        [x, y]: [u32; 2],
+        pixels: &[[u32; 2]; N],
         width: u32,
         sample: u32,
         dimension: u32,
     ) -> [u32; N] {
-        let pixel = |i: usize| (y * width + x).wrapping_add(i as u32);
+        let numbered = numbered(pixels, width);
+        let pixel = |i: usize| numbered[i];
         // The point of the sample, moved by a random vector that stays the same for a pixel and all samples of a round.
         let shifted = |point: u32, round: u32| {
             std::array::from_fn(|i| point.wrapping_add(Random::new(seed, pixel(i), round).u32(dimension)))
         };
         let (round, index) = (sample / BLOCK, sample % BLOCK);
         match self {
-            Self::Sobol => first_vertices::<1, N>(seed, pixel(0), sample, dimension)[0],
+            Self::Sobol => first_vertices::<1, N>(seed, &numbered, sample, dimension)[0],
             Self::Random => std::array::from_fn(|i| Random::new(seed, pixel(i), sample).u32(dimension)),
             Self::Stratified => std::array::from_fn(|i| {
                 let Strata { group, count, step } = Strata::of(dimension);
@@ -113,14 +114,24 @@ impl PixelSampler {
                 let (mask, size) = (blue_noise::mask(), blue_noise::SIZE as u32);
                 let moved = hash2(seed as u32, dimension);
                 let shift = hash3(seed as u32, (seed >> 32) as u32, dimension).wrapping_add(sobol(sample, dimension));
-                let row = (y + (moved >> 16)) % size;
                 std::array::from_fn(|i| {
-                    let column = (x + i as u32 + moved) % size;
+                    let [x, y] = pixels[i];
+                    let (column, row) = ((x + moved) % size, (y + (moved >> 16)) % size);
                     mask[(row * size + column) as usize].wrapping_add(shift)
                 })
             }
         }
     }
+}
+
+/// Numbers of pixels given by column and row, row by row.
+#[inline(always)]
+fn numbered<const N: usize>(pixels: &[[u32; 2]; N], width: u32) -> [u32; N] {
+    let mut numbers = [0; N];
+    for (number, [x, y]) in numbers.iter_mut().zip(pixels) {
+        *number = (y * width).wrapping_add(*x);
+    }
+    numbers
 }
 
 /// How a dimension is cut into strata: it and its neighbour into squares if they are coordinates of one place.
@@ -164,6 +175,11 @@ mod tests {
     use crate::random::unit_f64;
     use crate::statistics::{Moments, chi_square_p, normal_p_two_sided, pooled_chi_square, sidak};
 
+    /// The first pixels of row `y`.
+    fn row<const N: usize>(y: u32) -> [[u32; 2]; N] {
+        std::array::from_fn(|x| [x as u32, y])
+    }
+
     /// The mean over pixels of an integral over each, and its root mean square error, from `n` samples: over the pixel, the choice of a light
     /// and the light at once.
     fn integrate(sampler: PixelSampler, n: u32) -> Moments {
@@ -172,7 +188,7 @@ mod tests {
         for y in 0..16 {
             let mut sums = [0.0; 64];
             for sample in 0..n {
-                let numbers: [[u32; 64]; 5] = sampler.numbers(5, [0, y], width, sample, 0);
+                let numbers: [[u32; 64]; 5] = sampler.numbers(5, &row(y), width, sample, 0);
                 for (i, sum) in sums.iter_mut().enumerate() {
                     *sum += numbers.iter().map(|u| unit_f64(u[i])).sum::<f64>().exp();
                 }
@@ -213,7 +229,7 @@ mod tests {
             for first in [0, 64, 640] {
                 let (mut in_pixel, mut choices, mut on_light) = ([false; 64], [false; 64], [false; 64]);
                 for sample in first..first + 64 {
-                    let numbers: [[u32; 1]; 5] = sampler.numbers(1, [17, 3], 100, sample, 0);
+                    let numbers: [[u32; 1]; 5] = sampler.numbers(1, &[[17, 3]], 100, sample, 0);
                     let [x, y, choice, u, v] = numbers.map(|[u]| u as usize);
                     in_pixel[x >> 29 << 3 | y >> 29] = true;
                     choices[choice >> 26] = true;
@@ -232,7 +248,7 @@ mod tests {
         for sampler in PixelSampler::ALL {
             let mut bins = [[0_u64; 64]; 4];
             for y in 0..64 {
-                let numbers: [[u32; 64]; 5] = sampler.numbers(9, [0, y], 64, 11, 0);
+                let numbers: [[u32; 64]; 5] = sampler.numbers(9, &row(y), 64, 11, 0);
                 for (bins, pair) in bins.iter_mut().zip(numbers.windows(2)) {
                     let pairs = pair[0].iter().zip(&pair[1]);
                     pairs.for_each(|(u, v)| bins[(u >> 29 << 3 | v >> 29) as usize] += 1);

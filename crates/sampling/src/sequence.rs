@@ -82,7 +82,7 @@ impl VertexSequence {
     }
 }
 
-/// `D` dimensions, from `first_dimension` on, of the first vertex (`PixelSequence::vertex(0)`) for `N` pixels that follow each other,
+/// `D` dimensions, from `first_dimension` on, of the first vertex (`PixelSequence::vertex(0)`) for `N` pixels,
 /// 32 bits each, at one sample number. All pixels share the point and differ in its scramble, so there is nothing to look
 /// up per pixel, and the compiler takes several pixels at a time.
 #[allow(
@@ -92,16 +92,14 @@ impl VertexSequence {
 #[inline(always)]
 pub fn first_vertices<const D: usize, const N: usize>(
     seed: u64,
-    first_pixel: u32,
+    pixels: &[u32; N],
     sample: u32,
     first_dimension: u32,
 ) -> [[u32; N]; D] {
     let points: [u32; D] = std::array::from_fn(|d| reversed_sobol(sample.reverse_bits(), first_dimension + d as u32));
     let mut numbers = [[0; N]; D];
     for i in 0..N {
-        let [key, step] = PixelSequence::new(seed, first_pixel.wrapping_add(i as u32), sample)
-            .vertex(0)
-            .key;
+        let [key, step] = PixelSequence::new(seed, pixels[i], sample).vertex(0).key;
         for d in 0..D {
             let scramble = mix(key.wrapping_add(step.wrapping_mul(first_dimension + d as u32)));
             numbers[d][i] = reversed_owen_scramble(points[d], scramble).reverse_bits();
@@ -132,7 +130,8 @@ mod tests {
     #[test]
     fn many_pixels_at_a_time_get_the_same_numbers() {
         for (seed, first, sample) in [(0, 0, 0), (9, 77, 5), (u64::MAX, u32::MAX - 3, 1 << 20)] {
-            let numbers: [[u32; 16]; 6] = first_vertices(seed, first, sample, 2);
+            let pixels = std::array::from_fn(|i| first.wrapping_add(i as u32));
+            let numbers: [[u32; 16]; 6] = first_vertices(seed, &pixels, sample, 2);
             for i in 0..16_u32 {
                 let vertex = PixelSequence::new(seed, first.wrapping_add(i), sample).vertex(0);
                 for d in 2..8 {

@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::{machine, message, output};
 use anyhow::{Context, Result, bail};
 use render::gpu::Gpu;
-use render::{FrameLoop, GpuFault, RenderError, SceneRef, Settings};
+use render::{Film, FrameLoop, GpuFault, RenderError, SceneRef, Settings};
 use scene::{Camera, Scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -131,7 +131,7 @@ pub(crate) fn start<'s>(
     settings: &Settings,
 ) -> Result<Box<dyn FrameLoop<'s> + 's>> {
     // Compensated sums, moments, finished image and what the file writer copies; auxiliary images about double it.
-    let bytes_per_pixel = if settings.aovs { 256 } else { 128 };
+    let bytes_per_pixel = if settings.aovs { 256 } else { 128 } + if settings.adaptive_pixels { 64 } else { 0 };
     let bytes = u64::from(settings.width) * u64::from(settings.height) * bytes_per_pixel;
     if machine::available_memory_bytes().is_some_and(|available| bytes > available) {
         let (gib, size) = (bytes as f64 / (1u64 << 30) as f64, (settings.width, settings.height));
@@ -213,12 +213,15 @@ pub(crate) struct Budget {
     pub(crate) frames: Option<u64>,
     /// After so many seconds of rendering.
     pub(crate) seconds: Option<f64>,
-    /// When the estimated relMSE is below this.
-    pub(crate) relmse: Option<f64>,
+    /// When the relMSE is below this, as far as can be told.
+    pub(crate) target_error: Option<f64>,
 }
 
 /// Frames before the first look at the estimated error: variances of fewer are not worth a decision.
 const FIRST_LOOK: u64 = 16;
+
+/// Looks at the estimated error while the number of frames doubles; a power of two. Each is one more chance to stop by mistake.
+const LOOKS: u64 = 8;
 
 impl Budget {
     /// What the options say; `default` frames if they say nothing.
@@ -227,15 +230,40 @@ impl Budget {
         Self {
             frames,
             seconds: args.time,
-            relmse: None,
+            target_error: None,
         }
     }
 
-    /// The same, or as soon as the estimated relMSE is below `relmse`.
-    pub(crate) fn until(self, relmse: Option<f64>, args: &BudgetArgs) -> Self {
+    /// The same, or as soon as the relMSE is below `target_error`.
+    pub(crate) fn until(self, target_error: Option<f64>, args: &BudgetArgs) -> Self {
         // The default number of frames is for those who do not say when to stop.
-        let frames = if relmse.is_some() { args.spp } else { self.frames };
-        Self { frames, relmse, ..self }
+        let frames = if target_error.is_some() { args.spp } else { self.frames };
+        Self {
+            frames,
+            target_error,
+            ..self
+        }
+    }
+
+    /// The part of the way to the error asked for that is done, 1 when it is reached for all that can be told: when the upper end of its
+    /// confidence interval is below it. 0 between looks.
+    fn precision(&self, film: &Film) -> f64 {
+        let frames = film.spp();
+        // By the number of frames alone: a rendering that was stopped and goes on looks as if it had not been.
+        let step = (1 << frames.max(1).ilog2()) / LOOKS;
+        match self.target_error {
+            Some(target) if frames >= FIRST_LOOK && frames.is_multiple_of(step) => {
+                // The error falls at least in proportion to the frames.
+                film.estimated_error()
+                    .map_or(0.0, |error| (target / error.high).min(1.0))
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Whether `film` has the error that was asked for, if any was.
+    pub(crate) fn is_met(&self, film: &Film) -> bool {
+        self.precision(film) >= 1.0
     }
 
     /// The part that is done, 1 at the end.
@@ -261,7 +289,6 @@ pub(crate) fn render_frames(
     let pixels = u64::from(frame_loop.film().width()) * u64::from(frame_loop.film().height());
     let mut progress = Progress::new(what);
     let (mut frames, mut seconds) = (0, 0.0);
-    let mut next_look = FIRST_LOOK;
     loop {
         let start = Instant::now();
         frame_loop.render_frame();
@@ -271,14 +298,10 @@ pub(crate) fn render_frames(
         seconds += start.elapsed().as_secs_f64();
         frames += 1;
         let mut done = budget.done(frames, seconds);
-        if let Some(relmse) = budget.relmse
-            && frames >= next_look
-        {
-            // An eighth more frames each time: looking costs about a frame, and every look is one more chance to stop by mistake.
-            next_look += next_look / 8;
-            // The error falls at least in proportion to the frames.
-            let share = (relmse / frame_loop.film().estimated_relmse()).min(1.0);
-            done = done.max(share);
+        if budget.target_error.is_some() {
+            let start = Instant::now();
+            done = done.max(budget.precision(frame_loop.film()));
+            seconds += start.elapsed().as_secs_f64();
         }
         progress.update(done, frames, pixels);
         each(frame_loop);

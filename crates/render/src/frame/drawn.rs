@@ -99,6 +99,10 @@ impl<D: DirectLight> Frames for Drawn<D> {
         (counters, true)
     }
 
+    fn begin_sequence(&mut self, frame: u32) {
+        self.first_frame = frame;
+    }
+
     fn scene_changed(&mut self, scene: &Scene) {
         self.direct.scene_changed(scene);
     }

@@ -88,6 +88,11 @@ pub fn check(settings: &Settings) -> Result<SamplerKind, RenderError> {
     if settings.aovs {
         return Err(refusal("auxiliary images".into()));
     }
+    if settings.adaptive_pixels {
+        return Err(refusal(
+            "different numbers of samples per pixel (--target-error)".into(),
+        ));
+    }
     Ok(kind)
 }
 

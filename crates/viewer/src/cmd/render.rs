@@ -47,18 +47,18 @@ pub(crate) struct RenderArgs {
     output: PathBuf,
     #[command(flatten)]
     budget: BudgetArgs,
-    /// Stop when the estimated relMSE of the image is below this, at the latest after --spp or --time
+    /// Stop when the relMSE of the image is below this with 95 % confidence, at the latest after --spp or --time
     ///
-    /// Estimated from the variances of the pixels, after 16 samples or more. Slightly biased: samples that happen to agree stop it too soon.
+    /// Pixels take samples where the error is, one per frame on average; --spp then counts frames.
     #[arg(long, value_name = "ERROR", value_parser = error_bound)]
-    until_relmse: Option<f64>,
+    target_error: Option<f64>,
     /// Go on where FILE ends, to the bit as if nothing had happened; FILE is made if it is missing, and kept up to date
     #[arg(long, value_name = "FILE")]
     resume: Option<PathBuf>,
     /// Render the I-th of N equal shares of the samples, to be joined by `merge`
     ///
     /// Samplers that do not learn draw the samples that the whole would; the others learn in each share by themselves.
-    #[arg(long, value_name = "I/N", value_parser = Shard::parse, requires = "spp", conflicts_with_all = ["time", "until_relmse"])]
+    #[arg(long, value_name = "I/N", value_parser = Shard::parse, requires = "spp", conflicts_with_all = ["time", "target_error"])]
     shard: Option<Shard>,
     #[command(flatten)]
     size: SizeArgs,
@@ -101,6 +101,8 @@ enum Aov {
     Light,
     /// variance of the pixel's mean luminance (variance.V)
     Variance,
+    /// samples that the pixel has taken (samples.V)
+    Samples,
 }
 
 /// The file formats of images.
@@ -171,7 +173,14 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         output::check_writable(path)?;
     }
     let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)));
-    settings.aovs = args.aov.iter().any(|aov| *aov != Aov::Variance);
+    // The film knows the others in any case.
+    settings.aovs = args.aov.iter().any(|aov| ![Aov::Variance, Aov::Samples].contains(aov));
+    settings.adaptive_pixels = args.target_error.is_some();
+    if settings.adaptive_pixels && format == Format::Part {
+        bail!(
+            "parts of renderings with --target-error cannot be joined: give an .exr or .png, or leave out --target-error"
+        );
+    }
     settings.check()?;
     if settings.light.ignore_below > 0.0 {
         message::warn("--ignore-below drops lights: the image is biased, and marked so in its metadata and statistics");
@@ -197,7 +206,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         .display_server
         .as_ref()
         .map(|address| Display::connect(address, &title, settings.width, settings.height));
-    let mut budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
+    let mut budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.target_error, &args.budget);
     let mut shard = None;
     if let (Some(part), Some(all)) = (args.shard, budget.frames) {
         let share = part.frames(all);
@@ -220,7 +229,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let done = frames.film().spp();
     budget.frames = budget.frames.map(|all| all.saturating_sub(done));
     let mut saved = Instant::now();
-    if budget.frames != Some(0) {
+    if budget.frames != Some(0) && !budget.is_met(frames.film()) {
         session::render_frames(frames.as_mut(), budget, &watch, "rendering", |state| {
             if let Some(display) = &mut display {
                 display.update(|| state.film().image());
@@ -243,7 +252,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     let mut stats = Stats::new(&loaded, &camera.name, &settings, &run, interrupted, &back_end);
     // Measuring takes about as long as a frame: only where somebody will read the result.
     if args.stats.is_some() {
-        stats.measure(frames.as_ref());
+        stats.measure(frames.as_ref(), args.target_error);
     }
     match format {
         Format::Part => parts::write(&args.output, &header, frames.as_ref())?,
@@ -271,6 +280,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         }
     }
     summary(args, &loaded, &settings, &run);
+    if let Some(target) = args.target_error {
+        message::note(report(frames.film(), target));
+    }
     if run.nonfinite_samples > 0 {
         message::warn(format!(
             "{} samples were not finite and were left out: this is a bug",
@@ -316,6 +328,12 @@ fn layers(wanted: &[Aov], film: &Film, scene: &Scene, channels: &mut Vec<Channel
     };
     if wanted.contains(&Aov::Variance) {
         channels.push(one("variance.V", film.variance()));
+    }
+    if wanted.contains(&Aov::Samples) {
+        channels.push(one(
+            "samples.V",
+            film.samples().iter().map(|&count| count as f32).collect(),
+        ));
     }
     let Some(mut aovs) = film.aovs() else { return };
     if wanted.contains(&Aov::Albedo) {
@@ -370,6 +388,30 @@ pub(crate) fn metadata_of(header: &Header, spp: u64) -> Result<Vec<(String, Stri
         entry("spp", spp.to_string()),
         entry("settings", serde_json::to_string(&header.settings)?),
     ])
+}
+
+/// How good an image has become that was to have an error of `target`.
+fn report(film: &Film, target: f64) -> String {
+    let counts = film.sample_counts();
+    let samples = format!(
+        "{:.1} samples per pixel, {} to {}, median {}; skipped {:.0} % of the times",
+        counts.mean,
+        counts.least,
+        counts.most,
+        counts.median,
+        100.0 * counts.skipped
+    );
+    let Some(error) = film.estimated_error() else {
+        return format!("too few samples to tell the error; {samples}");
+    };
+    let converged = 100.0 * film.converged(target);
+    format!(
+        "estimated relMSE {:.2e}, with 95 % confidence {:.2e} to {:.2e} ({} {target}); by itself below that, as sure: {converged:.0} % of the pixels; {samples}",
+        error.relmse,
+        error.low,
+        error.high,
+        if error.high <= target { "asked for" } else { "NOT the" },
+    )
 }
 
 /// What was done, for people.

@@ -18,6 +18,8 @@ pub(super) enum Knob {
     Candidates,
     /// --light-samples: 1, 2, 4 and 8
     LightSamples,
+    /// with samples where the error is, as with `render --target-error`, and with one per pixel and frame
+    AdaptivePixels,
     /// with the control variate of `adaptive`, and without
     ControlVariate,
 }
@@ -107,6 +109,9 @@ impl Knob {
                 .into(),
             Self::LightSamples => COUNTS
                 .map(|count| with(&count.to_string(), &|s| s.light_samples = count))
+                .into(),
+            Self::AdaptivePixels => [("adaptive pixels", true), ("even pixels", false)]
+                .map(|(name, on)| with(name, &|s| s.adaptive_pixels = on))
                 .into(),
             Self::ControlVariate => [("on", true), ("off", false)]
                 .map(|(name, on)| with(name, &|s| s.light.control_variate = on))

@@ -107,7 +107,7 @@ impl Reference {
             let budget = Budget {
                 frames: Some(each),
                 seconds: None,
-                relmse: None,
+                target_error: None,
             };
             let what = format!(
                 "reference of {}, half {half} of 2, kept for next time",

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// What such a file begins with.
-const MAGIC: &[u8] = b"manylight state 1\n";
+const MAGIC: &[u8] = b"manylight state 2\n";
 
 /// A share of the samples of an image: number `index` of `count`, from 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]

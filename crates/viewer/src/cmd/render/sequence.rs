@@ -103,7 +103,7 @@ pub(super) fn run(
     };
     let back_end = BackEnd::open(args.light.one_backend()?)?;
     let mut renderer = back_end.start(&loaded.scene, first, settings)?;
-    let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.until_relmse, &args.budget);
+    let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.target_error, &args.budget);
     // By the first frame, if none is asked for: a film whose exposure jumps from picture to picture flickers.
     let mut exposure = args.exposure;
     let count = sequence.frames.len();

@@ -3,7 +3,7 @@
 use crate::machine;
 use crate::session::{BackEnd, Loaded};
 use render::gpu::PassTime;
-use render::{Choosing, FrameLoop, RenderStats, Settings};
+use render::{Choosing, ErrorEstimate, FrameLoop, RenderStats, SampleCounts, Settings};
 use scene::{Report, Scene};
 use serde::Serialize;
 
@@ -24,6 +24,14 @@ pub(super) struct Stats {
     max_bounces: u32,
     /// Samples per pixel.
     pub(super) spp: u64,
+    /// How they are spread over the pixels, if they went where the error is.
+    samples: Option<SampleCounts>,
+    /// What the image is off by as far as can be told; `None` likewise, and after few frames.
+    estimated_error: Option<ErrorEstimate>,
+    /// The relMSE that was asked for.
+    target_error: Option<f64>,
+    /// Share of the pixels whose own relative squared error is below that with 95 % confidence.
+    converged: Option<f64>,
     /// Seed of all random numbers.
     pub(super) seed: u64,
     threads: usize,
@@ -93,6 +101,10 @@ impl Stats {
             height: settings.height,
             max_bounces: settings.max_bounces,
             spp: run.frames,
+            samples: None,
+            estimated_error: None,
+            target_error: None,
+            converged: None,
             seed: settings.seed,
             threads,
             interrupted,
@@ -128,7 +140,14 @@ impl Stats {
     }
 
     /// Adds what takes time to find out.
-    pub(super) fn measure(&mut self, frames: &dyn FrameLoop<'_>) {
+    pub(super) fn measure(&mut self, frames: &dyn FrameLoop<'_>, target_error: Option<f64>) {
+        if let Some(target) = target_error {
+            let film = frames.film();
+            self.target_error = target_error;
+            self.samples = Some(film.sample_counts());
+            self.estimated_error = film.estimated_error();
+            self.converged = Some(film.converged(target));
+        }
         let frame_s = self.render_s / self.spp.max(1) as f64;
         self.choosing = frames.choosing();
         self.choose_share = self.choosing.map(|choosing| choosing.share(frame_s, self.threads));
