@@ -86,9 +86,9 @@ pub enum PixelFilter {
 #[serde(rename_all = "kebab-case")]
 pub enum Mis {
     /// In proportion to the densities.
+    #[default]
     Balance,
     /// In proportion to their squares.
-    #[default]
     Power,
     /// As balance, but nothing for densities below a tenth of the other.
     Cutoff,

@@ -10,9 +10,9 @@
 pub enum Heuristic {
     /// `q_i / sum q_k`. Veach's theorem 9.2: no choice of weights has a variance that is smaller by more than
     /// `(1 / min n_i - 1 / sum n_i)` times the squared integral.
+    #[default]
     Balance,
     /// `q_i^2 / sum q_k^2`: decides more sharply, which pays where one technique is nearly perfect.
-    #[default]
     Power,
     /// As balance, but techniques below a tenth of the largest `q` get nothing.
     Cutoff,
