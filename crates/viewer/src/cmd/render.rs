@@ -47,9 +47,10 @@ pub(crate) struct RenderArgs {
     output: PathBuf,
     #[command(flatten)]
     budget: BudgetArgs,
-    /// Stop when the relMSE of the image is below this with 95 % confidence, at the latest after --spp or --time
+    /// Stop when the estimated relMSE of the image is below this with 95 % confidence, at the latest after --spp or --time
     ///
-    /// Pixels take samples where the error is, one per frame on average; --spp then counts frames.
+    /// Pixels take samples where the error is, one per frame on average; --spp then counts frames. What no sample has met yet, such as rare
+    /// slivers of lamps, is in no estimate: the true error may be half as much again.
     #[arg(long, value_name = "ERROR", value_parser = error_bound)]
     target_error: Option<f64>,
     /// Go on where FILE ends, to the bit as if nothing had happened; FILE is made if it is missing, and kept up to date
@@ -406,7 +407,8 @@ fn report(film: &Film, target: f64) -> String {
     };
     let converged = 100.0 * film.converged(target);
     format!(
-        "estimated relMSE {:.2e}, with 95 % confidence {:.2e} to {:.2e} ({} {target}); by itself below that, as sure: {converged:.0} % of the pixels; {samples}",
+        "estimated relMSE {:.2e}, with 95 % confidence {:.2e} to {:.2e} ({} {target}), but for rare light that no sample has met; \
+         by itself below that, as sure: {converged:.0} % of the pixels; {samples}",
         error.relmse,
         error.low,
         error.high,
