@@ -10,6 +10,7 @@
 //! then, for a new sequence of random numbers, which are independent of those.
 
 use crate::Film;
+use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use rayon::prelude::*;
 use scene::luminance;
@@ -33,21 +34,27 @@ pub(crate) struct PathSample {
     pub(crate) control: Vec3,
 }
 
-/// The share of the control variate that a pixel takes, and what was seen of both, by luminance.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct PixelControl {
+/// The share of the control variate that a pixel takes, and what was seen of both, by luminance. The GPU keeps the same record:
+/// `PixelControl` in `shaders/record/film.wgsl`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Pod, Zeroable)]
+#[repr(C)]
+pub struct PixelControl {
     /// In \[0, 1\].
-    share: f32,
+    pub share: f32,
     /// Samples seen; fewer after each lesson.
-    count: f32,
-    mean_found: f32,
-    mean_control: f32,
-    /// Sums of the squared and of the mixed deviations from the means.
-    found_sq: f32,
-    control_sq: f32,
-    mixed: f32,
+    pub count: f32,
+    /// Mean of what was found without the control, scaled.
+    pub mean_found: f32,
+    /// Mean of the control, scaled.
+    pub mean_control: f32,
+    /// Sum of the squared deviations from [`PixelControl::mean_found`].
+    pub found_sq: f32,
+    /// Sum of the squared deviations from [`PixelControl::mean_control`].
+    pub control_sq: f32,
+    /// Sum of the products of both deviations.
+    pub mixed: f32,
     /// What luminances are multiplied by before they are squared: a power of two, about one over the first control; 0 before there was one.
-    scale: f32,
+    pub scale: f32,
 }
 
 impl PixelControl {

@@ -4,6 +4,7 @@ use super::*;
 use crate::{Image, Mis, PixelFilter, metric};
 use glam::Vec3;
 use light_cache::SamplerKind;
+use sampling::PixelSampler;
 use scene::{Instance, LightSource, Material, Mesh, SceneParts};
 
 /// A closed box [-1, 1]^3 seen from inside, all six sides of material 0; `lamp` adds a square of material 1 under its ceiling.

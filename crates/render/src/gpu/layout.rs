@@ -1,5 +1,6 @@
 //! Records that frames share with `shaders/record`.
 
+pub use crate::control::PixelControl;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use light_cache::{Observation, ShadingPoint};
@@ -33,23 +34,8 @@ impl FrameParams {
     pub(crate) const CONTROLS_LEARN: u32 = 2;
 }
 
-/// How much of the control variate a pixel takes: `PixelControl` in `shaders/record/film.wgsl`.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
-#[repr(C)]
-#[allow(missing_docs, reason = "told in the shader")]
-pub struct PixelControl {
-    pub share: f32,
-    pub count: f32,
-    pub mean_found: f32,
-    pub mean_control: f32,
-    pub found_sq: f32,
-    pub control_sq: f32,
-    pub mixed: f32,
-    pub scale: f32,
-}
-
 /// Sums of one pixel: `FilmPixel` in `shaders/record/film.wgsl`.
-#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 #[allow(missing_docs, reason = "told in the shader")]
 pub struct FilmPixel {
