@@ -3,6 +3,7 @@
 //! Errors are seen, and reported, relative to the brightness of the pixel; so a light matters by its share of the light
 //! at a point, not by its contribution alone (the weight 1 / F^2 in the second moment that is to be minimised).
 
+use crate::state::is_amount;
 use crate::{Observation, ShadingPoint};
 use sampling::hash::hash3;
 
@@ -76,6 +77,18 @@ impl Brightness {
         let mean = self.mean();
         let (sum, count) = self.cells[usize::from(cell)];
         (sum + PRIOR_SAMPLES * mean) / (count + PRIOR_SAMPLES) + LEAST * mean
+    }
+
+    /// Whether it can be what another of the same scene has become.
+    pub(crate) fn is_sound_like(&self, other: &Self) -> bool {
+        self.cells.len() == other.cells.len()
+            && self.cells_per_metre == other.cells_per_metre
+            && self
+                .cells
+                .iter()
+                .all(|&(sum, count)| is_amount(sum) && is_amount(count))
+            && is_amount(self.sum)
+            && is_amount(self.count)
     }
 
     /// Bytes held.

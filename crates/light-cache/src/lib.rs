@@ -262,8 +262,8 @@ pub trait LightSampler: Debug + Send + Sync {
         (!Self::LEARNS).then(Vec::new)
     }
 
-    /// Takes over what [`LightSampler::save`] has told. Returns whether it could be read; if not, nothing has changed. Bytes that were
-    /// damaged on the way may be taken for something else: check them before.
+    /// Takes over what [`LightSampler::save`] has told. Returns whether it could be read; if not, nothing has changed. Of damaged bytes only
+    /// those are taken that could have been learned: with them it draws other lights, as exactly as ever.
     fn restore(&mut self, state: &[u8]) -> bool {
         !Self::LEARNS && state.is_empty()
     }

@@ -9,6 +9,8 @@
 //! Long epochs observe more than is worth learning, all but what was not expected: a light that adds much more than its
 //! probability allowed for. Those observations are kept, and of the others a few, which stand for all.
 
+use crate::state::is_amount;
+use crate::tree::Receiver;
 use crate::{Observation, Pace};
 use sampling::hash::hash3;
 use std::borrow::Cow;
@@ -161,6 +163,18 @@ impl Schedule {
 
     fn next_frame(&self) -> u32 {
         (self.frame + 1).min(u32::MAX - 1)
+    }
+
+    /// Whether it can be what another of as many lights has become.
+    pub(crate) fn is_sound_like(&self, other: &Self, lights: usize) -> bool {
+        let sound = |o: &Observation| {
+            (o.light as usize) < lights
+                && Receiver::from(&o.point).is_sound()
+                && [o.unshadowed, o.irradiance, o.pmf].into_iter().all(is_amount)
+                && o.pmf > 0.0
+                && o.weight > 0
+        };
+        self.growth == other.growth && self.frame < u32::MAX && self.kept.iter().flatten().all(sound)
     }
 
     /// Bytes held.

@@ -11,6 +11,7 @@
 use crate::belief::chance_visible;
 use crate::brightness::Brightness;
 use crate::schedule::Schedule;
+use crate::state::{Saved, is_amount};
 use crate::{
     Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Scheme, Settings, ShadingPoint,
     Thinning, records, state,
@@ -226,6 +227,18 @@ impl Table {
         }
     }
 
+    fn is_sound(&self, lights: usize, frame: u32) -> bool {
+        let sound = |entry: &Entry| {
+            is_amount(entry.samples) && is_amount(entry.sum_sq) && is_amount(entry.max) && entry.frame <= frame
+        };
+        self.entries.len() == lights
+            && self.entries.iter().all(sound)
+            && match &self.distribution {
+                Some(distribution) => distribution.len() == lights && distribution.is_sound(),
+                None => lights == 0,
+            }
+    }
+
     fn bytes(&self) -> usize {
         size_of_val(&self.entries[..])
             + size_of_val(&self.weights[..])
@@ -274,6 +287,19 @@ fn ignore(weights: &mut [f64], entries: &[Entry], share: f64, floor: f64) {
     let even = floor / (1.0 - floor).max(1e-6) * weights.iter().sum::<f64>() / kept.max(1) as f64;
     for weight in weights.iter_mut().filter(|weight| **weight > 0.0) {
         *weight += even;
+    }
+}
+
+impl Saved for TableSampler {
+    fn is_sound_like(&self, fresh: &Self) -> bool {
+        let mut tables = [Some(&self.primary), self.secondary.as_ref()].into_iter().flatten();
+        tables.all(|table| table.is_sound(fresh.prior.len(), self.frame))
+            && self.prior == fresh.prior
+            && self.brightness.is_sound_like(&fresh.brightness)
+            && self.cautious == fresh.cautious
+            && self.settings == fresh.settings
+            && self.schedule.is_sound_like(&fresh.schedule, self.prior.len())
+            && self.frame < u32::MAX / 2
     }
 }
 
@@ -387,7 +413,9 @@ impl LightSampler for TableSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, point, points, scene_of};
+    use crate::testing::{
+        check, check_each_light_is_drawn, check_saving, mixed_lights, observe, point, points, scene_of,
+    };
 
     fn taught(scene: &Scene, settings: &Settings, frames: u32, visible: impl Fn(u32) -> bool) -> TableSampler {
         let mut sampler = TableSampler::new(&scene.lights, scene.radius, settings);
@@ -408,6 +436,14 @@ mod tests {
                 check_each_light_is_drawn(&sampler, &scene);
             }
         }
+    }
+
+    #[test]
+    fn is_saved_and_restored() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let mut sampler = taught(&scene, &Settings::default(), 6, |light| light.is_multiple_of(3));
+        let fresh = || TableSampler::new(&scene.lights, scene.radius, &Settings::default());
+        check_saving(&mut sampler, fresh, &scene, 400);
     }
 
     #[test]

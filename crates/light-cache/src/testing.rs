@@ -220,3 +220,64 @@ pub(crate) fn observe<S: LightSampler>(
     }
     logs
 }
+
+/// What is saved of `learned` goes on as it would, and damaged bytes are refused or harmless: nothing made of them may panic, or report what is no
+/// probability. `fresh`: of the same scene and settings.
+pub(crate) fn check_saving<S: LightSampler>(learned: &mut S, fresh: impl Fn() -> S, scene: &Scene, rounds: u32) {
+    let saved = learned.save().expect("it can be saved");
+    let pmfs = |sampler: &S| -> Vec<f32> {
+        let of = |point: &ShadingPoint| {
+            let local = sampler.local(scene, point);
+            (0..scene.lights.len() as u32)
+                .map(|light| sampler.pmf(&local, light))
+                .collect::<Vec<f32>>()
+        };
+        points(24, 5).iter().flat_map(of).collect()
+    };
+    let teach = |sampler: &mut S, frames: u32| {
+        for frame in 50..50 + frames {
+            let logs = observe(sampler, scene, frame, |light| light.is_multiple_of(3));
+            sampler.end_frame(scene, &logs);
+        }
+    };
+    let mut restored = fresh();
+    assert!(restored.restore(&saved));
+    assert_eq!(pmfs(learned), pmfs(&restored));
+    for sampler in [&mut *learned, &mut restored] {
+        teach(sampler, 9);
+    }
+    assert_eq!(pmfs(learned), pmfs(&restored));
+
+    let mut taken = 0;
+    for round in 0..rounds {
+        let random = |dimension| Random::new(17, round, 0).u32(dimension) as usize;
+        let mut forged = saved.clone();
+        for change in 0..1 + random(0) % 4 {
+            let at = random(2 * change as u32 + 1) % forged.len();
+            forged[at] = random(2 * change as u32 + 2) as u8;
+        }
+        let mut sampler = fresh();
+        if sampler.restore(&forged) {
+            taken += 1;
+            assert!(
+                pmfs(&sampler).iter().all(|pmf| (0.0..=1.0).contains(pmf)),
+                "round {round}"
+            );
+            teach(&mut sampler, 2);
+            assert!(
+                pmfs(&sampler).iter().all(|pmf| (0.0..=1.0).contains(pmf)),
+                "round {round}"
+            );
+            let _ = (
+                sampler.records(scene),
+                sampler.cells(scene),
+                sampler.pack(),
+                sampler.stats(),
+            );
+        }
+    }
+    assert!(
+        (1..rounds).contains(&taken),
+        "{taken} of {rounds} damaged states were taken"
+    );
+}

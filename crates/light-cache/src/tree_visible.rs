@@ -11,6 +11,7 @@
 mod visibility;
 
 use crate::schedule::Schedule;
+use crate::state::Saved;
 use crate::tree::{Descent, Floor, Tree, position, probability};
 use crate::{Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, Settings, ShadingPoint};
 use crate::{records, state};
@@ -122,6 +123,16 @@ impl TreeVisibleSampler {
     }
 }
 
+impl Saved for TreeVisibleSampler {
+    fn is_sound_like(&self, fresh: &Self) -> bool {
+        self.tree.is_sound_like(&fresh.tree)
+            && self.visibility.is_sound_like(&fresh.visibility, &self.tree)
+            && self.floor == fresh.floor
+            && self.settings == fresh.settings
+            && self.schedule.is_sound_like(&fresh.schedule, self.tree.len())
+    }
+}
+
 impl LightSampler for TreeVisibleSampler {
     type Local<'a> = Local<'a>;
     const LEARNS: bool = true;
@@ -225,7 +236,7 @@ impl LightSampler for TreeVisibleSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+    use crate::testing::{check, check_each_light_is_drawn, check_saving, mixed_lights, observe, points, scene_of};
 
     #[test]
     fn keeps_the_promises_of_a_sampler() {
@@ -240,6 +251,19 @@ mod tests {
             check(&sampler, &scene, &points(16, 5));
             check_each_light_is_drawn(&sampler, &scene);
         }
+    }
+
+    #[test]
+    fn is_saved_and_restored() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let fresh = || TreeVisibleSampler::new(&scene.lights, &Settings::default());
+        let mut sampler = fresh();
+        for frame in 0..6 {
+            let logs = observe(&sampler, &scene, frame, |light| light.is_multiple_of(3));
+            sampler.end_frame(&scene, &logs);
+        }
+        assert!(sampler.tree.least_second > 0.0, "it was built anew");
+        check_saving(&mut sampler, fresh, &scene, 400);
     }
 
     #[test]

@@ -145,7 +145,7 @@ pub trait FrameLoop<'s>: Send {
     }
 
     /// Takes over what [`FrameLoop::save`] has told, in a rendering of the same scene, camera and settings: it goes on to the bit as the other
-    /// would have. Bytes that were damaged on the way may be taken for something else: check them before.
+    /// would have. Bytes that were damaged on the way may be taken for another rendering's: check them before.
     ///
     /// # Errors
     /// [`RenderError::State`] if the bytes are no such state, or if this renderer cannot take one over.

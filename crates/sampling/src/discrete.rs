@@ -211,6 +211,22 @@ impl Discrete {
         self.floor as f64 / TOTAL as f64
     }
 
+    /// Whether it is one that weights can have made: one that was read from a file may not be.
+    pub fn is_sound(&self) -> bool {
+        let count = self.start.len() as u64;
+        if !(1..=1 << 31).contains(&count)
+            || self.start[0] != 0
+            || !self.start.is_sorted()
+            || u64::from(self.last) >= count
+            || self.floor > TOTAL / count
+        {
+            return false;
+        }
+        let mut again = self.clone();
+        again.build_guide();
+        (again.guide_shift, &again.guide) == (self.guide_shift, &self.guide)
+    }
+
     /// Appends it to `words`, for back ends that draw elsewhere; returns where. Five words: entries, last entry of mass above 0, bits by
     /// which a number is shifted to its guide cell, where the first values of the entries begin, where the guide begins.
     pub fn pack(&self, words: &mut Vec<u32>) -> u32 {

@@ -1,25 +1,27 @@
 //! Everything in this crate that takes bytes which others may have made, as functions for fuzzers: the folder `fuzz`, and the example `fuzz` of
 //! the package `tests`.
 //!
-//! None of them may panic, hang, or take memory out of proportion to what it is given. Not among them is what a sampler has learned in a state that
-//! `render --resume` continues: its checksum finds all damage, but one who forges it can make the program end.
+//! None of them may panic, hang, or take memory out of proportion to what it is given.
 
 use crate::camera_path::{self, Frames};
 use crate::cmd::render::parts::{self, Shard};
 use crate::tev;
 use crate::view::{script::Script, settings_file::Remembered};
-use render::Image;
+use render::{FrameLoop, Image, Settings, renderer};
+use scene::Scene;
+use std::sync::LazyLock;
 
 /// Takes bytes; returns whether they were understood.
 pub type Reader = fn(&[u8]) -> bool;
 
 /// All readers by name.
-pub const READERS: [(&str, Reader); 6] = [
+pub const READERS: [(&str, Reader); 7] = [
     ("script", script),
     ("camera-path", camera_path),
     ("window", window),
     ("arguments", arguments),
     ("part", part),
+    ("state", state),
     ("tev", tev),
 ];
 
@@ -65,6 +67,51 @@ pub fn part(bytes: &[u8]) -> bool {
     joined
 }
 
+/// What a rendering takes over that goes on (`render --resume`), what was learned included. States are large, so the bytes are changes to a
+/// valid one: four say where, a fifth what is put there.
+///
+/// # Panics
+/// If the image is not made of numbers after that.
+pub fn state(bytes: &[u8]) -> bool {
+    static SCENE: LazyLock<Scene> = LazyLock::new(|| scene::load("demo:points:16").expect("it is generated"));
+    static VALID: LazyLock<Vec<u8>> = LazyLock::new(|| {
+        let mut frames = tiny_rendering(&SCENE);
+        (0..9).for_each(|_| frames.render_frame());
+        frames.save().expect("it can be saved")
+    });
+    let mut changed = VALID.clone();
+    for change in bytes.as_chunks::<5>().0 {
+        let [a, b, c, d, value] = *change;
+        let place = u32::from_le_bytes([a, b, c, d]) as usize % changed.len();
+        changed[place] = value;
+    }
+    let mut frames = tiny_rendering(&SCENE);
+    let taken = frames.restore(&changed).is_ok();
+    for _ in 0..2 {
+        frames.render_frame();
+    }
+    let _ = (
+        frames.stats(),
+        frames.light_records(),
+        frames.cells(),
+        frames.choosing(),
+    );
+    let image = frames.film().image();
+    assert!(image.pixels.as_flattened().iter().all(|x| !x.is_nan()));
+    taken
+}
+
+/// Four pixels of a scene with more than one light.
+fn tiny_rendering(scene: &Scene) -> Box<dyn FrameLoop<'_> + '_> {
+    let settings = Settings {
+        width: 2,
+        height: 2,
+        max_bounces: 0,
+        ..Settings::default()
+    };
+    renderer(scene, &scene.parts.cameras[0], &settings).expect("these are settings")
+}
+
 /// An image shown in tev under a title of these bytes, its size by their number.
 ///
 /// # Panics
@@ -86,4 +133,15 @@ pub fn tev(bytes: &[u8]) -> bool {
 
 fn text(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(bytes).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_state_is_taken_as_it_was_saved_and_not_with_another_head() {
+        assert!(state(&[]));
+        assert!(!state(&[0, 0, 0, 0, 0xff, 1, 0, 0, 0, 0xff]));
+    }
 }

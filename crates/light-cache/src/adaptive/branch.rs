@@ -20,6 +20,15 @@ impl Branch {
         self.0
     }
 
+    /// Whether it is a branch of `tree`.
+    pub(super) fn is_in(self, tree: &Tree) -> bool {
+        match (self.light(), self.node()) {
+            (Some(place), _) => (place as usize) < tree.leaves.len(),
+            (_, Some(node)) => tree.nodes.get(node as usize).is_some_and(|node| node.count > 0),
+            _ => !tree.distant.is_empty(),
+        }
+    }
+
     /// The branch that tree node `node` is.
     pub(super) fn of_node(tree: &Tree, node: u32) -> Self {
         let n = &tree.nodes[node as usize];

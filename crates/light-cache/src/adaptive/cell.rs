@@ -11,6 +11,7 @@ use super::palette::Palette;
 use super::subcells::{Count, Cube, SubCells};
 use super::weights::{Factors, Part, View, Wanted, Weighed, Weights};
 use crate::Observation;
+use crate::state::is_amount;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 use glam::Vec3;
 
@@ -58,6 +59,19 @@ pub(super) struct Entry {
 }
 
 impl Entry {
+    fn is_sound(&self) -> bool {
+        let amounts = [
+            self.believed,
+            self.scale,
+            self.drawn,
+            self.visible,
+            self.sum,
+            self.sum_sq,
+            self.prior,
+        ];
+        amounts.into_iter().all(is_amount)
+    }
+
     /// What was learned: estimated root mean square ratio. The prior fades as 1 / n where nothing was ever visible, as it
     /// is weighed down once for the count and once for what the count taught, and in the long run as n^-1/2 with a
     /// small constant: what was not visible so far may still be, to few points.
@@ -301,7 +315,7 @@ impl Cell {
         self.subcells.len()
     }
 
-    fn branches(&self) -> impl Iterator<Item = Branch> {
+    fn branches(&self) -> impl ExactSizeIterator<Item = Branch> {
         self.entries.iter().map(|entry| entry.branch)
     }
 
@@ -311,6 +325,31 @@ impl Cell {
             visible: entry.visible,
         };
         self.entries.iter().map(of).collect()
+    }
+
+    /// Whether it can be a cell of these `lights` after so many `frames`.
+    pub(super) fn is_sound(&self, lights: Lights<'_>, frames: u64) -> bool {
+        let tree = lights.tree;
+        let mut next = 0;
+        let in_order = |entry: &Entry| {
+            let sound = entry.branch.is_in(tree) && entry.branch.first(tree) == next;
+            next += if sound { entry.branch.count(tree) } else { 0 };
+            sound && entry.is_sound()
+        };
+        let firsts = |entry: &Entry| entry.branch.first(tree);
+        self.origin.level <= super::grid::MAX_LEVEL
+            && self.origin.frame <= frames
+            && (1..=PROBES).contains(&self.probes.len())
+            && self.probes.iter().all(Receiver::is_sound)
+            && (1..=MAX_ENTRIES).contains(&self.entries.len())
+            && self.entries.iter().all(in_order)
+            && next as usize == tree.len()
+            && self.firsts.iter().copied().eq(self.entries.iter().map(firsts))
+            && self.weights.is_sound(self.branches(), lights.palette.is_some())
+            && self.subcells.is_sound(self.entries.len(), lights.palette.is_some())
+            && [self.seen, self.built_at, self.refined_at, self.total]
+                .into_iter()
+                .all(is_amount)
     }
 
     /// Bytes held.

@@ -71,6 +71,14 @@ impl Cells {
         Some(cell.around(spot.cube))
     }
 
+    /// Whether they can be what others of the same `lights` have become in so many `frames`.
+    pub(super) fn is_sound_like(&self, other: &Self, lights: Lights<'_>, frames: u64) -> bool {
+        self.cells.len() <= MAX_CELLS
+            && self.unit == other.unit
+            && self.grid.is_sound_like(&other.grid, self.cells.len())
+            && self.cells.par_iter().all(|cell| cell.is_sound(lights, frames))
+    }
+
     /// The number of the cell of `point`, if there is one.
     pub(super) fn number_at(&self, point: &ShadingPoint) -> Option<u64> {
         let number = self.grid.find(self.grid.locate(point).key);

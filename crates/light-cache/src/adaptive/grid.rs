@@ -20,7 +20,7 @@ const SECONDARY_SCALE: f32 = 4.0;
 /// The smallest cube, as a share of the scene's radius.
 const MIN_SIZE: f32 = 1.0 / 4096.0;
 /// No cell is larger than 2 to this power times the smallest cube.
-const MAX_LEVEL: u32 = 31;
+pub(super) const MAX_LEVEL: u32 = 31;
 
 /// Maps keys to cells: open addressing, frozen during a frame.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -117,6 +117,19 @@ impl Grid {
         let sizes = [self.min_size, self.inverse_min_size].map(f32::to_bits);
         let bits = self.slots.len().trailing_zeros();
         [slots, bits, ex, ey, ez, cx, cy, cz, sizes[0], sizes[1]]
+    }
+
+    /// Whether it can be what another of the same scene has become, with so many `cells`.
+    pub(super) fn is_sound_like(&self, other: &Self, cells: usize) -> bool {
+        let used = self.slots.iter().filter(|slot| slot.1 != NO_CELL);
+        self.eye_ws.is_finite()
+            && (self.center_ws, self.min_size, self.inverse_min_size)
+                == (other.center_ws, other.min_size, other.inverse_min_size)
+            && self.slots.len().is_power_of_two()
+            && self.slots.len() > 1
+            && used.clone().all(|slot| (slot.1 as usize) < cells)
+            && used.count() == self.used
+            && self.used * 2 <= self.slots.len()
     }
 
     /// Adds a key that is not there yet.

@@ -26,6 +26,7 @@ mod subcells;
 mod weights;
 
 use crate::schedule::Schedule;
+use crate::state::Saved;
 use crate::tree::{Descent, PER_U32, Receiver, Tree, UNIT, position, probability};
 use crate::{
     CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, Settings, ShadingPoint,
@@ -123,6 +124,22 @@ impl AdaptiveSampler {
             build_s: start.elapsed().as_secs_f64(),
             learn_s: 0.0,
         }
+    }
+}
+
+impl Saved for AdaptiveSampler {
+    fn is_sound_like(&self, fresh: &Self) -> bool {
+        let lights = Lights {
+            tree: self.tree(),
+            palette: self.palette.as_ref(),
+        };
+        self.prior.is_sound_like(&fresh.prior)
+            && self.table.is_sound_like(&fresh.table)
+            && self.palette == fresh.palette
+            && self.table_mass == fresh.table_mass
+            && self.settings == fresh.settings
+            && self.schedule.is_sound_like(&fresh.schedule, self.tree().len())
+            && self.cells.is_sound_like(&fresh.cells, lights, self.frames)
     }
 }
 
@@ -378,7 +395,7 @@ impl AdaptiveSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{check, check_each_light_is_drawn, mixed_lights, observe, points, scene_of};
+    use crate::testing::{check, check_each_light_is_drawn, check_saving, mixed_lights, observe, points, scene_of};
     use glam::DVec3;
 
     fn learned(scene: &Scene, frames: u32, visible: impl Fn(u32) -> bool) -> AdaptiveSampler {
@@ -400,6 +417,21 @@ mod tests {
             }
             check_each_light_is_drawn(&learned(&scene, 4, |light| light.is_multiple_of(3)), &scene);
         }
+    }
+
+    #[test]
+    fn is_saved_and_restored() {
+        let mut lights = mixed_lights(100, 3);
+        // Sums that leave the range of `f32` if nothing is done against it.
+        lights[10].intensity *= 1e20;
+        lights[11].intensity *= 1e-20;
+        let scene = scene_of(lights);
+        let mut sampler = learned(&scene, 7, |light| light.is_multiple_of(3));
+        check_saving(
+            &mut sampler,
+            || AdaptiveSampler::new(&scene, &Settings::default()),
+            &scene,
+        );
     }
 
     #[test]

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 use scene::{Light, luminance};
 
 /// Running sums over the lights in tree order, so that the colour of any branch is a difference of two.
-#[derive(Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct Palette {
     /// Strengths by channel of all lights before each place, and of all of them: one entry more than there are lights.
     sums: Vec<DVec3>,

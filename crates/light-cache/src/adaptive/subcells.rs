@@ -7,6 +7,7 @@
 use super::branch::Branch;
 use super::weights::{Factors, LANES, Lanes};
 use crate::Observation;
+use crate::state::is_amount;
 use crate::tree::Tree;
 
 /// Cubes of each layer along an edge of the cell: 2 to this power. Higher values follow finer shadows; lower values learn faster.
@@ -123,6 +124,25 @@ impl SubCell {
         }
     }
 
+    /// Whether it can be one of a cut into so many `entries`, with so many cubes in the layer `before`.
+    fn is_sound(&self, entries: usize, before: usize) -> bool {
+        let rows = entries.div_ceil(LANES);
+        let factors = [&self.drawn, &self.expected];
+        (self.around == NONE) == (before == 0)
+            && (before == 0 || usize::from(self.around) < before)
+            && self.counts.len() == entries
+            && self
+                .counts
+                .iter()
+                .all(|count| is_amount(count.drawn) && is_amount(count.visible))
+            && (factors.iter().all(|lanes| lanes.is_empty()) || factors.iter().all(|lanes| lanes.len() == rows))
+            && factors
+                .iter()
+                .all(|lanes| lanes.as_flattened().iter().copied().all(is_amount))
+            && is_amount(self.seen)
+            && is_amount(self.built_at)
+    }
+
     fn bytes(&self) -> usize {
         size_of::<Self>()
             + self.counts.capacity() * size_of::<Count>()
@@ -236,6 +256,21 @@ impl SubCells {
             }
             subcell.counts = counts;
         }
+    }
+
+    /// Whether these can be the cubes of a cell with a cut into so many `entries`.
+    pub(super) fn is_sound(&self, entries: usize, controlled: bool) -> bool {
+        let mut before = 0;
+        let mut sound = |(layer, bits): (&Layer, u32)| {
+            let count = layer.subcells.len();
+            let numbered = |&number: &u16| number == NONE || usize::from(number) < count;
+            let sound = layer.numbers.len() == 1 << (3 * bits)
+                && layer.numbers.iter().all(numbered)
+                && layer.subcells.iter().all(|subcell| subcell.is_sound(entries, before));
+            before = count;
+            sound
+        };
+        self.certainty == Self::new(controlled).certainty && self.layers.iter().zip(LAYERS).all(&mut sound)
     }
 
     /// Bytes held.

@@ -7,6 +7,7 @@
 
 use super::branch::Branch;
 use super::emitter::Emitter;
+use crate::state::is_amount;
 use crate::tree::Receiver;
 use glam::Vec3;
 
@@ -140,6 +141,45 @@ impl Row {
     }
 }
 
+impl Row {
+    fn is_sound(&self) -> bool {
+        let Self {
+            center,
+            axis,
+            radius,
+            quarter_inverse_radius,
+            depth,
+            quarter_inverse_depth,
+            one_sided,
+            isotropic,
+            weight,
+            everywhere,
+            branch: _,
+        } = self;
+        let amounts = [
+            radius,
+            quarter_inverse_radius,
+            depth,
+            quarter_inverse_depth,
+            one_sided,
+            isotropic,
+            weight,
+            everywhere,
+        ];
+        [center, axis]
+            .iter()
+            .all(|xyz| xyz.as_flattened().iter().all(|x| x.is_finite()))
+            && amounts.iter().all(|lanes| lanes.iter().copied().all(is_amount))
+    }
+}
+
+impl Attenuation {
+    fn is_sound(&self) -> bool {
+        let numbers = [self.cone_scale, self.cone_offset, self.inverse_range_sq];
+        numbers.as_flattened().iter().all(|x| x.is_finite())
+    }
+}
+
 impl Weights {
     /// The cut of `entries`, in tree order; at most as many as a cell may have. `controlled`: with what is expected of them.
     pub(super) fn new(entries: &[Weighed], controlled: bool) -> Self {
@@ -220,6 +260,22 @@ impl Weights {
     /// Whether any entry is attenuated.
     pub(super) fn is_attenuated(&self) -> bool {
         !self.attenuation.is_empty()
+    }
+
+    /// Whether these can be the weights of a cut into `branches`.
+    pub(super) fn is_sound(&self, mut branches: impl ExactSizeIterator<Item = Branch>, controlled: bool) -> bool {
+        let rows = branches.len().div_ceil(LANES);
+        let none_or_all = |count: usize| count == 0 || count == rows;
+        self.rows.len() == rows
+            && none_or_all(self.attenuation.len())
+            && self.expected.len() == if controlled { rows } else { 0 }
+            && (0..branches.len()).all(|entry| branches.next() == Some(self.rows[entry % rows].branch[entry / rows]))
+            && self.rows.iter().all(Row::is_sound)
+            && self.attenuation.iter().all(Attenuation::is_sound)
+            && self
+                .expected
+                .iter()
+                .all(|Expected(channels)| channels.as_flattened().iter().copied().all(is_amount))
     }
 
     /// Bytes held.

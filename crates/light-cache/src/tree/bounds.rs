@@ -131,7 +131,7 @@ pub(crate) enum Emission {
 }
 
 /// What importance needs to know about one light, in three quarters of a cache line.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C)]
 pub(crate) struct LeafLight {
     /// Centroid or position, world space.

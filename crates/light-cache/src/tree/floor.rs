@@ -5,7 +5,7 @@ use sampling::discrete::TOTAL;
 
 /// An equal number of the 2^32 random numbers for every light, in one contiguous range at the low end, so that the
 /// strata of the others stay whole.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Floor {
     /// Random numbers per light.
     units: u32,

@@ -24,6 +24,13 @@ pub(crate) struct Receiver {
     pub(crate) normal: Vec3,
 }
 
+impl Receiver {
+    /// Whether it can be that of a point of a surface.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.position.is_finite() && self.normal.is_normalized()
+    }
+}
+
 /// Largest cosine between a normal in the node's cone and the direction from a place in its ball to the receiver, in sines and
 /// cosines (Conty Estevez and Kulla 2018, section 5, equation 3); 0 if nothing is emitted that way.
 fn cos_from_cone(node: &Node, to: Vec3, distance_sq: f32, radius_sq: f32) -> f32 {

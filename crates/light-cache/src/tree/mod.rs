@@ -23,6 +23,7 @@ pub(crate) use interval::{PER_U32, UNIT, position, probability};
 pub(crate) use sample::Descent;
 pub use sampler::TreeSampler;
 
+use crate::state::is_amount;
 use glam::Vec3;
 use scene::{Light, LightKind};
 
@@ -32,7 +33,7 @@ pub(crate) const LEAF: u32 = u32::MAX;
 pub(crate) const MAX_LEAF_LIGHTS: usize = 4;
 
 /// A group of lights: one cache line.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     /// Middle of the box around the lights, world space.
@@ -75,7 +76,7 @@ impl Default for Node {
 }
 
 /// A light at infinity.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct DistantLight {
     /// Unit direction the light goes.
     pub(crate) direction: Vec3,
@@ -186,6 +187,66 @@ impl Tree {
             Some(leaf) => leaf.index(),
             None => self.distant[place as usize - self.leaves.len()].index,
         }
+    }
+
+    /// Whether it is a tree over the lights of `other`, which may lie in another order and have other weights.
+    pub(crate) fn is_sound_like(&self, other: &Self) -> bool {
+        self.leaves.len() == other.leaves.len()
+            && self.distant.len() == other.distant.len()
+            && self.rank.len() == other.rank.len()
+            && (0.0..1.0).contains(&self.least_second)
+            && (0..).zip(&self.leaves).all(|(place, leaf)| {
+                let index = leaf.index() as usize;
+                let same = other
+                    .rank
+                    .get(index)
+                    .and_then(|&place| other.leaves.get(place as usize));
+                self.rank.get(index) == Some(&place)
+                    && is_amount(leaf.weight)
+                    && same.is_some_and(|same| same.with_weight(leaf.weight) == *leaf)
+            })
+            && (self.leaves.len()..)
+                .zip(self.distant.iter().zip(&other.distant))
+                .all(|(place, (light, same))| {
+                    self.rank.get(light.index as usize) == Some(&(place as u32))
+                        && is_amount(light.weight)
+                        && *light
+                            == DistantLight {
+                                weight: light.weight,
+                                ..*same
+                            }
+                })
+            && self.has_sound_nodes()
+    }
+
+    /// Whether every node's lights are those of its children, which come after it, and those of the root are all.
+    fn has_sound_nodes(&self) -> bool {
+        let all = self.nodes.first().map_or(0, |root| root.count as usize);
+        let ends_right = |node: &Node| (u64::from(node.first) + u64::from(node.count)) as usize <= self.leaves.len();
+        all == self.leaves.len()
+            && (0..).zip(&self.nodes).all(|(index, node): (u32, _)| {
+                let [first, second] = [node.child, node.child.wrapping_add(1)].map(|i| self.nodes.get(i as usize));
+                let numbers = [
+                    node.center,
+                    node.half,
+                    node.axis,
+                    Vec3::new(node.cos_o, node.sin_o, node.cos_e),
+                ];
+                ends_right(node)
+                    && is_amount(node.weight)
+                    && numbers.iter().all(|numbers| numbers.is_finite())
+                    && match (first, second) {
+                        _ if node.child == LEAF => node.count as usize <= MAX_LEAF_LIGHTS,
+                        (Some(first), Some(second)) => {
+                            node.child > index
+                                && [first, second].iter().all(|child| child.count > 0 && ends_right(child))
+                                && first.first == node.first
+                                && second.first == first.first + first.count
+                                && node.count == first.count + second.count
+                        }
+                        _ => false,
+                    }
+            })
     }
 
     /// Bytes held.

@@ -2,6 +2,7 @@
 
 use crate::Observation;
 use crate::belief::chance_visible;
+use crate::state::is_amount;
 use crate::tree::{LEAF, Tree};
 use scene::Light;
 
@@ -213,6 +214,24 @@ impl Visibility {
     pub(super) fn seen(&self, place: u32) -> (u64, f64) {
         let seen = &self.seen[place as usize];
         (u64::from(seen.rays), f64::from(seen.arrived) / f64::from(seen.rays))
+    }
+
+    /// Whether it can be what another of the same lights, in whatever order, has become, if `tree` is the tree now.
+    pub(super) fn is_sound_like(&self, other: &Self, tree: &Tree) -> bool {
+        let sound = |evidence: &Evidence| is_amount(evidence.samples) && is_amount(evidence.visible);
+        self.seen.len() == tree.len()
+            && self.strengths.len() == tree.len()
+            && self.groups.len() == tree.nodes.len()
+            && self
+                .seen
+                .iter()
+                .all(|seen| sound(&seen.evidence) && is_amount(seen.mean))
+            && self.strengths.iter().copied().all(is_amount)
+            && self
+                .groups
+                .iter()
+                .all(|(evidence, share)| sound(evidence) && is_amount(*share))
+            && (self.min_prior, self.group_exponent) == (other.min_prior, other.group_exponent)
     }
 
     /// Bytes held.
