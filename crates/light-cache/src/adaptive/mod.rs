@@ -18,6 +18,7 @@
 mod branch;
 mod cell;
 mod cells;
+mod cut;
 mod emitter;
 mod grid;
 mod packed;
@@ -427,11 +428,8 @@ mod tests {
         lights[11].intensity *= 1e-20;
         let scene = scene_of(lights);
         let mut sampler = learned(&scene, 7, |light| light.is_multiple_of(3));
-        check_saving(
-            &mut sampler,
-            || AdaptiveSampler::new(&scene, &Settings::default()),
-            &scene,
-        );
+        let fresh = || AdaptiveSampler::new(&scene, &Settings::default());
+        check_saving(&mut sampler, fresh, &scene, 24);
     }
 
     #[test]
