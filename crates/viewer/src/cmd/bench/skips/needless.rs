@@ -206,7 +206,7 @@ fn add_texel(parts: &mut SceneParts, texel: [u8; 4], srgb: bool) -> TextureRef {
         name: "one texel".into(),
         width: 1,
         height: 1,
-        texels: vec![texel],
+        texels: vec![texel].into(),
         srgb,
         wrap: Default::default(),
         nearest: false,
