@@ -48,7 +48,7 @@ struct Line {
     ratio: f64,
     /// Their first and third quartile.
     quartiles: [f64; 2],
-    /// Noise, estimated relMSE at equal samples: forced over as it is; `None` where the image is black.
+    /// Noise, estimated relMSE at equal samples: forced over as it is; `None` where the image is black or of one frame.
     noise: Option<f64>,
     /// Shadow rays of the forced frames over those of the others; `None` where there are none.
     shadow_rays: Option<f64>,
@@ -285,7 +285,7 @@ impl Samples {
             ratio: quantile(&mut self.ratios, 0.5),
             quartiles: [quantile(&mut self.ratios, 0.25), quantile(&mut self.ratios, 0.75)],
             ratios,
-            noise: (self.noise[0] > 0.0).then(|| self.noise[1] / self.noise[0]),
+            noise: (self.noise[0] > 0.0 && self.noise[0].is_finite()).then(|| self.noise[1] / self.noise[0]),
             shadow_rays: (self.shadow_rays[0] > 0).then(|| self.shadow_rays[1] as f64 / self.shadow_rays[0] as f64),
             memory: (self.memory[1] > self.memory[0]).then(|| self.memory[1] as f64 / self.memory[0].max(1) as f64),
             difference,
