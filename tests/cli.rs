@@ -2,6 +2,7 @@
 
 mod camera_paths;
 mod measuring;
+mod memory;
 mod sampling;
 mod state;
 mod unlucky;

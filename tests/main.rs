@@ -1,5 +1,7 @@
 //! The cross-crate tests, one binary.
 
+/// What is made on demand under a memory budget.
+mod budget;
 /// The program as people and scripts meet it.
 mod cli;
 /// Scenes whose image is known in closed form.

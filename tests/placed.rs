@@ -46,7 +46,7 @@ fn placed_and_masked() -> Scene {
         name: "leaf".into(),
         width: 8,
         height: 8,
-        texels: (0..64).map(texel).collect(),
+        texels: (0..64).map(texel).collect::<Vec<_>>().into(),
         srgb: true,
         wrap: Default::default(),
         nearest: false,

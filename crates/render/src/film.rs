@@ -250,6 +250,17 @@ impl Film {
         self.height
     }
 
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let of_tile = |tile: &Tile| {
+            size_of_val(&*tile.pixels)
+                + size_of_val(&*tile.earlier)
+                + size_of_val(&*tile.rates)
+                + size_of_val(&*tile.aovs)
+        };
+        size_of_val(&*self.tiles) + self.tiles.iter().map(of_tile).sum::<usize>()
+    }
+
     /// The tiles, top row first, to be rendered in parallel.
     pub(crate) fn tiles_mut(&mut self) -> &mut [Tile] {
         &mut self.tiles

@@ -46,7 +46,7 @@ pub struct RenderStats {
 pub enum SceneRef<'s> {
     /// Somebody else's.
     Borrowed(&'s Scene),
-    /// Kept as long as anyone needs it.
+    /// Kept as long as anyone needs it. Where a rendering has it alone, the budget of [`Scene::set_memory_budget`] is kept too.
     Shared(Arc<Scene>),
 }
 
@@ -58,6 +58,18 @@ impl Deref for SceneRef<'_> {
             Self::Borrowed(scene) => scene,
             Self::Shared(scene) => scene,
         }
+    }
+}
+
+impl SceneRef<'_> {
+    /// Drops what the scene has made on demand and may not keep ([`Scene::make_room`]). Returns whether it could: only whoever has the scene alone
+    /// can.
+    pub(crate) fn make_room(&mut self) -> bool {
+        let alone = match self {
+            Self::Borrowed(_) => None,
+            Self::Shared(scene) => Arc::get_mut(scene),
+        };
+        alone.map(Scene::make_room).is_some()
     }
 }
 
@@ -91,6 +103,9 @@ pub trait FrameLoop<'s>: Send {
 
     /// Width and height of the film, which is not read back for that.
     fn size(&self) -> (u32, u32);
+
+    /// The scene that it renders.
+    fn scene(&self) -> &Scene;
 
     /// [`Film::spp`], likewise.
     fn spp(&self) -> u64;

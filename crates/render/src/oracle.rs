@@ -77,7 +77,7 @@ impl Frames for Oracle {
         self.prepare_s += start.elapsed().as_secs_f64();
     }
 
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
+    fn render<const AOVS: bool>(&mut self, eye: &mut Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
         let tiles = film.tiles_mut().par_iter_mut().zip(&self.tiles);
         let counters = tiles.map(|(tile, known)| {
             let mut log = TileLog {

@@ -60,6 +60,9 @@ fn write(parts: &SceneParts, path: &Path) -> io::Result<()> {
     };
     for (index, texture) in parts.textures.iter().enumerate() {
         let bytes = material::png(texture)?;
+        if let Some(fault) = texture.texels.fault() {
+            return Err(io::Error::other(fault.to_string()));
+        }
         document.textures.push(json!({ "source": index, "sampler": index }));
         document.samplers.push(material::sampler(texture));
         document

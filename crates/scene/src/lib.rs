@@ -2,7 +2,7 @@
 //!
 //! Data flows one way: a glTF file ([`load`]) or a generator ([`generate`]) fills a [`SceneParts`]; [`Scene::new`]
 //! validates it, finds the lights and builds what every ray needs of the acceleration structure; after that a scene never changes, but for what is
-//! made or read when a ray first needs it ([`stored`], [`bvh`]).
+//! made, read or decoded when a ray first needs it ([`stored`], [`bvh`]), and may be dropped again between rays ([`Scene::make_room`]).
 //!
 //! Absent from this crate: GPU, random state (samples take their `u` as an argument), windows. Files are read in
 //! [`gltf`] and made in [`export`] only, by way of [`mod@file`], which everything that writes files uses. After [`Scene::new`] has succeeded every index is in range, every normal
@@ -22,6 +22,7 @@ mod inputs;
 pub mod instance;
 pub mod light;
 pub mod material;
+mod memory;
 pub mod mesh;
 pub mod packed;
 mod recentre;
@@ -41,6 +42,7 @@ pub use error::SceneError;
 pub use instance::Instance;
 pub use light::{Light, LightKind, LightPoint, LightSource};
 pub use material::Material;
+pub use memory::{KeptBytes, Memory, MemoryUse};
 pub use mesh::Mesh;
 pub use report::Report;
 pub use scene::{Counts, Scene, SceneParts, load};

@@ -7,7 +7,7 @@ use crate::recentre::recentre;
 use crate::shading::Shading;
 use crate::validate::{texture_refs, validate};
 use crate::{
-    Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Mesh, PrimitiveId, Ray, Report,
+    Camera, Hit, Instance, Light, LightKind, LightPoint, LightSource, Material, Memory, Mesh, PrimitiveId, Ray, Report,
     SceneError, StoredMesh, Texture,
 };
 use glam::{DVec3, Vec2, Vec3};
@@ -27,7 +27,7 @@ pub struct SceneParts {
     pub instances: Vec<Instance>,
     /// Materials.
     pub materials: Vec<Material>,
-    /// Textures.
+    /// Textures. Some may still be in their file.
     pub textures: Vec<Texture>,
     /// Punctual lights, with where they come from. [`Scene::new`] adds the emissive triangles.
     pub punctual: Vec<(Light, LightSource)>,
@@ -40,6 +40,8 @@ pub struct SceneParts {
     /// Where the zero of all positions here lies in the file, metres. Scenes that lie far from zero for their size are moved there, because
     /// single precision has no digits for both; add it to positions that people or other programs see.
     pub origin_ws: DVec3,
+    /// The account of what is made on demand.
+    pub memory: Arc<Memory>,
 }
 
 /// A scene ready for rendering.
@@ -57,7 +59,7 @@ pub struct Scene {
     /// Seconds spent in building what every ray needs of the BVH; trees of instanced meshes follow when a ray first comes near them.
     pub build_s: f64,
     pub(crate) shading: Shading,
-    bvh: Arc<Bvh>,
+    pub(crate) bvh: Arc<Bvh>,
     /// Index into `parts.punctual` by light; empty if there are none.
     pub(crate) punctual_of_light: Vec<u32>,
     /// By mesh with emitting triangles, the first triangle of each run of triangles that come from one primitive of the file.
@@ -174,6 +176,10 @@ impl Scene {
                 !placed_once,
                 "instanced meshes that no ray comes near: no trees, no shading records (render --stats counts them)",
             ),
+            (
+                parts.textures.iter().any(|texture| texture.texels.is_deferred()),
+                "textures that no ray meets: not decoded, only their headers were checked (render --stats counts them)",
+            ),
             (flat, "no smooth normals: no interpolation"),
             (lambert, "no glossy materials: lights are not looked for by reflection"),
             (self.lights.is_empty(), "no lights: no shadow rays"),
@@ -186,18 +192,23 @@ impl Scene {
         self.parts.report.skipped.extend(lines);
     }
 
-    /// Builds all that otherwise waits until a ray needs it: trees and shading records of instanced meshes. The image does not depend on it.
+    /// Builds all that otherwise waits until a ray needs it: trees and shading records of instanced meshes, meshes and textures that are still in
+    /// their file. The image does not depend on it.
     pub fn build_all(&self) {
         self.bvh.build_all(&self.parts);
         let meshes = 0..self.parts.meshes.len() as u32;
         meshes.into_par_iter().for_each(|mesh| {
             self.shading.records(&self.parts, mesh);
         });
+        self.parts.textures.par_iter().for_each(|texture| {
+            let _: &[[u8; 4]] = &texture.texels;
+        });
     }
 
-    /// Why a mesh could not be read when a ray first came near it, if one could not: the images since then lack it.
+    /// Why a mesh or a texture could not be read when a ray first needed it, if one could not: the images since then lack it.
     pub fn fault(&self) -> Option<&SceneError> {
-        self.parts.meshes.iter().find_map(StoredMesh::fault)
+        let of_mesh = self.parts.meshes.iter().find_map(StoredMesh::fault);
+        of_mesh.or_else(|| self.parts.textures.iter().find_map(|texture| texture.texels.fault()))
     }
 
     /// The acceleration structure.

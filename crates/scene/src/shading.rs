@@ -6,11 +6,10 @@
 //! material record (48 bytes, shared by many hits), instead of indices, three positions, the material index and
 //! the material: two dependent cache misses fewer in a large scene.
 
-use crate::alone::alone;
+use crate::memory::{Droppable, OnDemand};
 use crate::{Material, Mesh, SceneParts, StoredMesh};
 use glam::Vec3;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 
 /// Marks a triangle whose material does not emit.
 pub(crate) const NO_EMITTER: u32 = u32::MAX;
@@ -129,7 +128,7 @@ pub(crate) struct Shading {
     /// Records of the mesh of instance 0, if it is placed by the identity.
     pub(crate) fixed: Vec<TriangleRecord>,
     /// By mesh, records of the others.
-    triangles: Vec<OnceLock<Vec<TriangleRecord>>>,
+    triangles: Vec<OnDemand<Vec<TriangleRecord>>>,
     pub(crate) materials: Vec<MaterialRecord>,
     /// Light index by placed emitting triangle, [`crate::surface::NO_LIGHT`] where that triangle is too small to be one.
     pub(crate) lights: Vec<u32>,
@@ -154,7 +153,7 @@ impl Shading {
                 .collect()
         };
         let mut shading = Self {
-            triangles: parts.meshes.iter().map(|_| OnceLock::new()).collect(),
+            triangles: parts.meshes.iter().map(|_| OnDemand::default()).collect(),
             materials: parts.materials.iter().map(MaterialRecord::new).collect(),
             emitters: parts.meshes.par_iter().map(emitters).collect(),
             ..Self::default()
@@ -188,7 +187,7 @@ impl Shading {
         if self.fixed_mesh() == Some(mesh) {
             return &self.fixed;
         }
-        self.triangles[mesh as usize].get_or_init(|| alone(|| self.pack_mesh(parts, mesh)))
+        self.triangles[mesh as usize].get_or_make(&parts.memory, || self.pack_mesh(parts, mesh))
     }
 
     /// The record of a triangle, if it is packed already.
@@ -197,6 +196,24 @@ impl Shading {
             return self.fixed.get_mut(triangle as usize);
         }
         self.triangles[mesh as usize].get_mut()?.get_mut(triangle as usize)
+    }
+
+    /// For dropping records: those of mesh 0 stay.
+    pub(crate) fn droppable(&mut self) -> impl Iterator<Item = &mut dyn Droppable> {
+        self.triangles.iter_mut().map(|records| records as &mut dyn Droppable)
+    }
+
+    /// Bytes of what stays.
+    pub(crate) fn kept_bytes(&self) -> usize {
+        size_of_val(&*self.fixed)
+            + size_of_val(&*self.placements)
+            + size_of_val(&*self.materials)
+            + size_of_val(&*self.lights)
+            + self
+                .emitters
+                .iter()
+                .map(|emitters| size_of_val(&**emitters))
+                .sum::<usize>()
     }
 
     fn pack_mesh(&self, parts: &SceneParts, index: u32) -> Vec<TriangleRecord> {

@@ -1,5 +1,6 @@
 //! Images on surfaces.
 
+use crate::stored::Texels;
 use glam::{IVec2, Vec2, Vec4};
 use std::sync::LazyLock;
 
@@ -15,7 +16,7 @@ pub enum Wrap {
     Clamp,
 }
 
-/// A texture: 8-bit RGBA texels as in the file, with how to read them.
+/// A texture: 8-bit RGBA texels as in the file, with how to read them. One in a file is decoded when it is first sampled.
 #[derive(Clone, Debug)]
 pub struct Texture {
     /// Name of the image in the file, for messages.
@@ -25,7 +26,7 @@ pub struct Texture {
     /// Height in texels.
     pub height: u32,
     /// `width * height` texels, top row first, RGBA.
-    pub texels: Vec<[u8; 4]>,
+    pub texels: Texels,
     /// Whether RGB is sRGB-encoded (colour) or linear (data such as normals).
     pub srgb: bool,
     /// Wrapping along u and v.
@@ -89,7 +90,8 @@ impl Texture {
 
     #[inline]
     fn filter(&self, x: [usize; 2], y: [usize; 2], f: Vec2, decode: impl Fn([u8; 4]) -> Vec4) -> Vec4 {
-        let texel = |x: usize, y: usize| decode(self.texels[y * self.width as usize + x]);
+        let texels: &[[u8; 4]] = &self.texels;
+        let texel = |x: usize, y: usize| decode(texels[y * self.width as usize + x]);
         if self.nearest {
             return texel(x[0], y[0]);
         }
@@ -133,12 +135,12 @@ mod tests {
     use super::*;
 
     fn gradient(wrap: Wrap, nearest: bool) -> Texture {
-        let texels = (0..4).map(|x| [x * 80, 0, 255 - x * 80, 255]).collect();
+        let texels: Vec<_> = (0..4).map(|x| [x * 80, 0, 255 - x * 80, 255]).collect();
         Texture {
             name: String::new(),
             width: 4,
             height: 1,
-            texels,
+            texels: texels.into(),
             srgb: false,
             wrap: [wrap; 2],
             nearest,
@@ -189,7 +191,7 @@ mod tests {
     #[test]
     fn srgb_is_decoded_and_alpha_is_not() {
         let texture = Texture {
-            texels: vec![[188, 0, 255, 128]; 4],
+            texels: vec![[188, 0, 255, 128]; 4].into(),
             srgb: true,
             ..gradient(Wrap::Repeat, false)
         };

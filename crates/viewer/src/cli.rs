@@ -296,6 +296,24 @@ pub(crate) fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a number of bytes.
+pub(crate) fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_uppercase().as_str() {
+        "K" | "KIB" => 1_u64 << 10,
+        "M" | "MIB" => 1 << 20,
+        "G" | "GIB" => 1 << 30,
+        "T" | "TIB" => 1 << 40,
+        _ => return Err(BYTES.into()),
+    };
+    let value = digits.parse::<f64>().map_err(|_| BYTES)? * unit as f64;
+    // Beyond it, an f64 counts bytes no more.
+    let countable = value >= 1.0 && value <= (1_u64 << 53) as f64;
+    countable.then_some(value as u64).ok_or_else(|| BYTES.into())
+}
+
+const BYTES: &str = "must be a size above 0 with its unit, K, M, G or T (of 1024), such as 512M or 1.5G";
+
 fn share(text: &str) -> Result<f32, String> {
     let value = text.parse::<f32>().ok().filter(|value| (0.0..=1.0).contains(value));
     value.ok_or_else(|| "must be a number from 0 to 1".into())
@@ -311,12 +329,25 @@ fn not_negative(text: &str) -> Result<f32, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cli, SizeArgs};
+    use super::{Cli, SizeArgs, bytes};
     use clap::CommandFactory;
 
     #[test]
     fn the_command_line_is_sound() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(bytes("512M"), Ok(512 << 20));
+        assert_eq!(bytes("1.5g"), Ok(3 << 29));
+        assert_eq!(bytes("16KiB"), Ok(16 << 10));
+        for odd in [
+            "", "M", "512", "-1G", "0K", "nanG", "infG", "1e30G", "5X", "5 GB", "5MM", "\u{b5}G",
+        ] {
+            let problem = bytes(odd).expect_err(odd);
+            assert!(problem.contains("512M"), "{odd}: {problem}");
+        }
     }
 
     #[test]

@@ -7,6 +7,8 @@
     reason = "doc comments of arguments are their help text, brackets and all"
 )]
 
+#[cfg(unix)]
+mod allocator;
 mod camera_path;
 mod clean;
 mod cli;

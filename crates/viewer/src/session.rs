@@ -31,6 +31,21 @@ impl Loaded {
         self.scene.build_all();
         self.scene.build_s += start.elapsed().as_secs_f64();
     }
+
+    /// The scene for a rendering to have alone, as a memory budget asks for, and what is known of it.
+    pub(crate) fn give(self) -> (Arc<Scene>, Origin) {
+        let Self { scene, what, load_s } = self;
+        (Arc::new(scene), Origin { what, load_s })
+    }
+}
+
+/// What is known of a scene besides the scene itself.
+#[derive(Debug)]
+pub(crate) struct Origin {
+    /// [`Loaded::what`].
+    pub(crate) what: String,
+    /// [`Loaded::load_s`].
+    pub(crate) load_s: f64,
 }
 
 /// Whether `word` looks like a scene rather than a mistyped command.

@@ -7,6 +7,7 @@ use crate::control::Controls;
 use crate::direct::DirectLight;
 use crate::path::{Counters, TileLog, render_tile};
 use light_cache::{CellRecord, LightRecord, Observation, SamplerStats, ShadingPoint};
+use rayon::iter::Either;
 use rayon::prelude::*;
 use scene::Scene;
 use std::borrow::Cow;
@@ -67,29 +68,35 @@ impl<D: DirectLight> Frames for Drawn<D> {
 
     /// All tiles in parallel, each with its own pixels, random numbers and observations, so that the threads share
     /// nothing and their number changes nothing.
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
-        let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
-        let pace = self.direct.pace();
-        film.set_weight(pace.frame_weight);
-        let tiles = film
-            .tiles_mut()
-            .par_iter_mut()
-            .zip(&mut self.observations)
-            .zip(self.controls.tiles_mut());
-        let counters = tiles.map(|((tile, observations), controls)| {
-            observations.clear();
-            if stop.load(Ordering::Relaxed) {
-                return Counters::default();
-            }
-            let mut log = TileLog {
-                observations,
-                controls,
-                counters: Counters::default(),
-            };
-            render_tile::<D, AOVS>(&view, tile, &mut log);
-            log.counters
-        });
-        let counters = counters.reduce(Counters::default, Counters::add);
+    ///
+    /// Tiles that find the memory budget spent wait until all that have begun are done and room was made; at least one gets through each time.
+    fn render<const AOVS: bool>(&mut self, eye: &mut Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
+        film.set_weight(self.direct.pace().frame_weight);
+        let tiles = film.tiles_mut().iter_mut().zip(&mut self.observations);
+        let mut waiting: Vec<_> = tiles.zip(self.controls.tiles_mut()).collect();
+        let mut counters = Counters::default();
+        while !waiting.is_empty() {
+            let bounded = eye.scene.make_room();
+            let view = eye.view(&self.direct).in_sequence_since(self.first_frame);
+            let (later, done): (Vec<_>, Vec<Counters>) = waiting.into_par_iter().partition_map(|work| {
+                if bounded && view.scene.memory().is_full() {
+                    return Either::Left(work);
+                }
+                let ((tile, observations), controls) = work;
+                observations.clear();
+                let mut log = TileLog {
+                    observations,
+                    controls,
+                    counters: Counters::default(),
+                };
+                if !stop.load(Ordering::Relaxed) {
+                    render_tile::<D, AOVS>(&view, tile, &mut log);
+                }
+                Either::Right(log.counters)
+            });
+            counters = done.into_iter().fold(counters, Counters::add);
+            waiting = later;
+        }
         if stop.load(Ordering::Relaxed) {
             return (counters, false);
         }

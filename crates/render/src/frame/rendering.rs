@@ -63,8 +63,8 @@ pub(crate) trait Frames: Send {
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film);
 
     /// Adds one sample to every pixel. With `AOVS` to the auxiliary images too. Once `stop` is set it does nothing more,
-    /// learns nothing, and returns false.
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool);
+    /// learns nothing, and returns false. It may drop what the scene of `eye` has made on demand while no ray is on its way.
+    fn render<const AOVS: bool>(&mut self, eye: &mut Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool);
 
     /// Before frame number `frame`: from it on, random numbers must be independent of all before.
     fn begin_sequence(&mut self, _frame: u32) {}
@@ -203,9 +203,9 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
             self.frames.begin_sequence(self.eye.frame);
         }
         let (counters, finished) = if self.aovs {
-            self.frames.render::<true>(&self.eye, &mut self.film, stop)
+            self.frames.render::<true>(&mut self.eye, &mut self.film, stop)
         } else {
-            self.frames.render::<false>(&self.eye, &mut self.film, stop)
+            self.frames.render::<false>(&mut self.eye, &mut self.film, stop)
         };
         self.counters = self.counters + counters;
         self.eye.frame = self.eye.frame.wrapping_add(1);
@@ -232,6 +232,10 @@ impl<'s, F: Frames> FrameLoop<'s> for Rendering<'s, F> {
 
     fn size(&self) -> (u32, u32) {
         (self.film.width(), self.film.height())
+    }
+
+    fn scene(&self) -> &Scene {
+        &self.eye.scene
     }
 
     fn spp(&self) -> u64 {

@@ -317,7 +317,7 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
         }
     }
 
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
+    fn render<const AOVS: bool>(&mut self, eye: &mut Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
         let nothing = (Counters::default(), false);
         if stop.load(Ordering::Relaxed) || self.failure.is_some() {
             return nothing;

@@ -19,7 +19,7 @@ mod traverse;
 mod tree;
 
 use crate::SceneParts;
-use crate::alone::alone;
+use crate::memory::{Droppable, OnDemand, Weigh};
 use bounds::Bounds;
 pub use flat::FlatBvh;
 use glam::Vec3;
@@ -32,7 +32,6 @@ use pack::Pack;
 pub use packet::{PACKET, Packet};
 use query::Query;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 use tree::Tree;
 
 /// A ray. `direction` is of unit length; hits count in (0, `t_max`).
@@ -89,7 +88,7 @@ pub struct Bvh {
     /// All other instances, by leaf of the top tree.
     placed: Vec<u32>,
     /// By mesh. A tree depends on its mesh only, whichever ray needed it first.
-    trees: Vec<OnceLock<Tree>>,
+    trees: Vec<OnDemand<Tree>>,
 }
 
 /// Geometry in world space.
@@ -114,7 +113,7 @@ impl Bvh {
             fixed: None,
             top: None,
             placed: Vec::new(),
-            trees: parts.meshes.iter().map(|_| OnceLock::new()).collect(),
+            trees: parts.meshes.iter().map(|_| OnDemand::default()).collect(),
         };
         let bounds: Vec<Bounds> = parts.meshes.par_iter().map(Bounds::of_mesh).collect();
         let mut boxes = Vec::new();
@@ -155,8 +154,9 @@ impl Bvh {
     fn first_use(&self, parts: &SceneParts, mesh: u32) -> &Tree {
         match &self.fixed {
             Some(fixed) if fixed.mesh == mesh as usize => &fixed.tree,
-            _ => self.trees[mesh as usize]
-                .get_or_init(|| alone(|| Tree::build(&parts.meshes[mesh as usize], &parts.materials))),
+            _ => self.trees[mesh as usize].get_or_make(&parts.memory, || {
+                Tree::build(&parts.meshes[mesh as usize], &parts.materials)
+            }),
         }
     }
 
@@ -172,7 +172,7 @@ impl Bvh {
 
     /// Number of meshes whose trees are built.
     pub fn built(&self) -> usize {
-        let built = self.trees.iter().filter(|tree| tree.get().is_some()).count();
+        let built = self.trees.iter().filter(|tree| tree.peek().is_some()).count();
         built + usize::from(self.fixed.is_some())
     }
 
@@ -249,10 +249,20 @@ impl Bvh {
 
     /// Bytes held by what is built.
     pub fn bytes(&self) -> usize {
+        let trees: usize = self.trees.iter().filter_map(OnDemand::peek).map(Weigh::bytes).sum();
+        self.kept_bytes() + trees
+    }
+
+    /// Bytes of what stays: the tree of what is placed once, and the tree over instances.
+    pub(crate) fn kept_bytes(&self) -> usize {
         let fixed = self.fixed.as_ref().map_or(0, |fixed| fixed.tree.bytes());
         let top = self.top.as_ref().map_or(0, |top| size_of_val(&*top.nodes));
-        let trees: usize = self.trees.iter().filter_map(OnceLock::get).map(Tree::bytes).sum();
-        fixed + top + trees + size_of_val(&*self.placed)
+        fixed + top + size_of_val(&*self.placed)
+    }
+
+    /// For dropping the other trees.
+    pub(crate) fn droppable(&mut self) -> impl Iterator<Item = &mut dyn Droppable> {
+        self.trees.iter_mut().map(|tree| tree as &mut dyn Droppable)
     }
 }
 

@@ -4,6 +4,7 @@ use super::bounds::Bounds;
 use super::node::{self, Node};
 use super::pack::Pack;
 use super::{bvh2, collapse};
+use crate::memory::Weigh;
 use crate::{Material, Mesh};
 use glam::Vec3;
 
@@ -49,9 +50,10 @@ impl Tree {
         tree.packs.shrink_to_fit();
         tree
     }
+}
 
-    /// Bytes held.
-    pub(super) fn bytes(&self) -> usize {
+impl Weigh for Tree {
+    fn bytes(&self) -> usize {
         size_of_val(&*self.nodes) + size_of_val(&*self.packs)
     }
 }

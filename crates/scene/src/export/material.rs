@@ -153,7 +153,7 @@ pub(super) fn png(texture: &Texture) -> std::io::Result<Vec<u8>> {
     let mut out = Cursor::new(Vec::new());
     image::write_buffer_with_format(
         &mut out,
-        bytemuck::cast_slice(&texture.texels),
+        bytemuck::cast_slice::<[u8; 4], u8>(&texture.texels),
         texture.width,
         texture.height,
         image::ExtendedColorType::Rgba8,

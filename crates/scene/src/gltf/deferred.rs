@@ -5,7 +5,7 @@ use super::json::{Accessor, Checked, ComponentType, Mode, Primitive, Semantic, T
 use super::materials::Needs;
 use super::source::Source;
 use crate::stored::Outline;
-use crate::{Mesh, Report, SceneError, StoredMesh};
+use crate::{Memory, Mesh, Report, SceneError, StoredMesh};
 use glam::Vec3;
 use serde_json::Value;
 use std::sync::Arc;
@@ -24,6 +24,7 @@ pub(super) fn mesh(
     needs: &Arc<[Needs]>,
     emits: impl Fn(usize) -> bool,
     budget: &mut Budget,
+    memory: &Arc<Memory>,
 ) -> Result<Option<StoredMesh>, SceneError> {
     let json = &source.json.meshes[index];
     let outlines = json.primitives.iter().map(|primitive| {
@@ -50,7 +51,7 @@ pub(super) fn mesh(
         smooth: outlines.iter().any(|outline| outline.smooth),
     };
     let (source, needs) = (source.clone(), needs.clone());
-    Ok(Some(StoredMesh::deferred(outline, move || {
+    Ok(Some(StoredMesh::deferred(outline, memory.clone(), move || {
         read(&source, index, &needs, &place, &outline)
     })))
 }

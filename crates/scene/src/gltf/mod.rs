@@ -9,6 +9,7 @@ mod bounds;
 mod cameras;
 mod census;
 mod deferred;
+mod encoded;
 mod framing;
 mod geometry;
 mod images;
@@ -42,7 +43,8 @@ const MAX_COPIED_TRIANGLES: usize = 20_000;
 /// faster, because what is placed once has one tree then.
 const MAX_WHOLE: u64 = 64 << 20;
 
-/// Reads a `.gltf` or `.glb` file. A mesh of a large file may be read later, see [`crate::StoredMesh`].
+/// Reads a `.gltf` or `.glb` file. Textures are decoded when they are first sampled, see [`crate::stored::Texels`]; a mesh of a large file may
+/// be read later, see [`crate::StoredMesh`].
 ///
 /// # Errors
 /// [`SceneError`], naming file, place and remedy.
@@ -77,7 +79,7 @@ pub fn read_above(path: &Path, max_whole: u64) -> Result<SceneParts, SceneError>
             .skipped
             .push(format!("{unused} images that no visible material needs: not decoded"));
     }
-    parts.textures = images.decode(&source)?;
+    parts.textures = images.textures(&source, &parts.memory)?;
     parts.materials = materials;
     if used.last() == Some(&false) {
         parts.materials.pop();
@@ -87,7 +89,7 @@ pub fn read_above(path: &Path, max_whole: u64) -> Result<SceneParts, SceneError>
     for (index, placements) in placements.iter().enumerate().filter(|(_, p)| !p.is_empty()) {
         let emits = |material: usize| parts.materials.get(material).is_some_and(Material::emits);
         let later = match source.on_disk() {
-            true => deferred::mesh(&source, index, &needs, emits, &mut budget)?,
+            true => deferred::mesh(&source, index, &needs, emits, &mut budget, &parts.memory)?,
             false => None,
         };
         let mesh = match later {

@@ -82,8 +82,8 @@ impl Buffer {
 }
 
 /// A file as it was when it was read.
-#[derive(Debug)]
-struct Seen {
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Seen {
     path: PathBuf,
     len: u64,
     /// Where the system tells.
@@ -97,6 +97,27 @@ impl Seen {
             len: metadata.len(),
             modified: metadata.modified().ok(),
         }
+    }
+
+    /// The bytes of the file, which `scene` wants for `what`.
+    ///
+    /// # Errors
+    /// [`SceneError`] for one that cannot be read, or has changed.
+    pub(super) fn read(&self, scene: &Path, what: &str) -> Result<Vec<u8>, SceneError> {
+        let (bytes, now) = read_file(scene, &self.path, what)?;
+        match now == *self {
+            true => Ok(bytes),
+            false => Err(self.changed(scene)),
+        }
+    }
+
+    fn changed(&self, scene: &Path) -> SceneError {
+        invalid(
+            scene,
+            self.path.display().to_string(),
+            "was changed while the scene was in use",
+            "load it again once it is written",
+        )
     }
 
     /// Whether the file is no longer what it was.
@@ -139,6 +160,17 @@ impl Source {
         super::census::refuse_required(&source)?;
         source.read_buffers(opened.buffer, blob)?;
         Ok(source)
+    }
+
+    /// Where the file is.
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Whether the bytes of a buffer view have stayed on the disk.
+    pub(super) fn is_on_disk(&self, view: Index<View>, place: &str) -> Result<bool, SceneError> {
+        let (buffer, _) = self.locate(view, place)?;
+        Ok(matches!(buffer, Buffer::Disk { .. }))
     }
 
     /// Whether there are bytes that have stayed on the disk.
@@ -232,6 +264,28 @@ impl Source {
             };
             return decoded.ok_or_else(|| self.invalid(what, "unreadable data URI", "export the file again"));
         }
+        let (bytes, seen) = read_file(&self.path, &self.path_beside(uri, what)?, what)?;
+        self.note(seen);
+        Ok(bytes)
+    }
+
+    /// The file beside this one that `uri` names, as it is, to be read later; `None` for a data URI.
+    pub(super) fn beside(&self, uri: &str, what: &str) -> Result<Option<Seen>, SceneError> {
+        if uri.starts_with("data:") {
+            return Ok(None);
+        }
+        let path = self.path_beside(uri, what)?;
+        let (_, seen) = open_file(&path).map_err(|source| wanted(&self.path, &path, what, source))?;
+        self.note(seen.clone());
+        Ok(Some(seen))
+    }
+
+    fn note(&self, seen: Seen) {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner).push(seen);
+    }
+
+    /// Where the file is that a relative URI names.
+    fn path_beside(&self, uri: &str, what: &str) -> Result<PathBuf, SceneError> {
         let relative = String::from_utf8(decode_percent(uri)).map_err(|_| {
             self.invalid(
                 what,
@@ -250,9 +304,7 @@ impl Source {
             ));
         }
         let folder = self.path.parent().unwrap_or(Path::new(""));
-        let (bytes, seen) = read_file(&self.path, &folder.join(relative), what)?;
-        self.seen.lock().unwrap_or_else(PoisonError::into_inner).push(seen);
-        Ok(bytes)
+        Ok(folder.join(relative))
     }
 
     /// Makes sure that everything was read from the same state of the files.
@@ -263,11 +315,7 @@ impl Source {
         let seen = self.seen.lock().unwrap_or_else(PoisonError::into_inner);
         match seen.iter().find(|file| file.has_changed()) {
             None => Ok(()),
-            Some(file) => Err(self.invalid(
-                file.path.display().to_string(),
-                "was changed while the scene was loading",
-                "load it again once it is written",
-            )),
+            Some(file) => Err(file.changed(&self.path)),
         }
     }
 
@@ -314,7 +362,12 @@ impl Source {
     }
 }
 
-fn invalid(path: &Path, place: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> SceneError {
+pub(super) fn invalid(
+    path: &Path,
+    place: impl Into<String>,
+    problem: impl Into<String>,
+    remedy: impl Into<String>,
+) -> SceneError {
     SceneError::Invalid {
         path: path.into(),
         place: place.into(),
@@ -369,11 +422,16 @@ fn read_file(scene: &Path, file: &Path, what: &str) -> Result<(Vec<u8>, Seen), S
         opened.read_to_end(&mut bytes)?;
         Ok((bytes, seen))
     };
-    read().map_err(|source| SceneError::Read {
+    read().map_err(|source| wanted(scene, file, what, source))
+}
+
+/// `file`, which is wanted as a part of `scene`, cannot be read.
+fn wanted(scene: &Path, file: &Path, what: &str, source: io::Error) -> SceneError {
+    SceneError::Read {
         path: file.into(),
         what: format!("{what} of {}", scene.display()),
         source,
-    })
+    }
 }
 
 /// Opens regular files only: a URI must not make us wait for a pipe or read a device without end.

@@ -20,7 +20,7 @@ pub(crate) struct Collected {
     pub(crate) punctual: Vec<u32>,
 }
 
-/// Collects emissive triangles and punctual lights, and enters the indices of the former into `shading.lights`.
+/// Collects emissive triangles and punctual lights, and enters the indices of the former into `shading.lights`. Decodes the textures of what emits.
 pub(crate) fn collect(parts: &mut SceneParts, shading: &mut Shading, radius: f32) -> Collected {
     let punctual = check_punctual(parts, radius);
     let placed = placed_emitters(parts, shading);

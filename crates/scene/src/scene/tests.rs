@@ -211,7 +211,7 @@ fn screen() -> SceneParts {
         name: "screen".into(),
         width: 2,
         height: 1,
-        texels: vec![[0, 0, 0, 255], [255, 255, 255, 255]],
+        texels: vec![[0, 0, 0, 255], [255, 255, 255, 255]].into(),
         srgb: true,
         wrap: Default::default(),
         nearest: true,
@@ -250,7 +250,7 @@ fn textured_emitters_count_by_their_mean_and_shine_by_their_texel() {
     assert!((400..600).contains(&seen), "{seen}");
     // All dark: no light at all.
     let mut dark = screen();
-    dark.textures[0].texels = vec![[0, 0, 0, 255]; 2];
+    dark.textures[0].texels = vec![[0, 0, 0, 255]; 2].into();
     let dark = Scene::new(dark).unwrap();
     assert!(dark.lights.is_empty() && dark.parts.report.warnings.is_empty());
     assert_eq!(see(&dark, eye, Vec3::ZERO).unwrap().emitted, Vec3::ZERO);
@@ -448,7 +448,7 @@ fn normal_maps_tilt_along_the_coordinates() {
                 name: "bumps".into(),
                 width: 1,
                 height: 1,
-                texels: vec![texel],
+                texels: vec![texel].into(),
                 srgb: false,
                 wrap: Default::default(),
                 nearest: false,

@@ -4,11 +4,13 @@ pub(crate) mod parts;
 mod sequence;
 mod stats;
 
-use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, default_method};
+#[cfg(unix)]
+use crate::allocator;
+use crate::cli::{Backend, BudgetArgs, LightArgs, SizeArgs, any_method, bytes, default_method};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
-use crate::session::{self, BackEnd, Budget, Loaded};
+use crate::session::{self, BackEnd, Budget, Origin};
 use crate::tev::Display;
 use crate::{machine, message, output, table};
 use anyhow::{Context, Result, bail};
@@ -80,6 +82,12 @@ pub(crate) struct RenderArgs {
     /// Build everything before the first frame, also what no ray will touch: for measurements, the image is the same
     #[arg(long)]
     build_all: bool,
+    /// Bytes that may be taken by what is made when a ray first needs it: trees of instanced meshes, textures, meshes left in the file
+    ///
+    /// What was not used for longest is dropped, and made again when a ray needs it: the image is the same. Higher values save time; lower
+    /// values save memory. Lights, lamps, what is placed once and the image itself do not count and stay.
+    #[arg(long, value_name = "SIZE", allow_negative_numbers = true, value_parser = bytes, conflicts_with = "build_all")]
+    memory_budget: Option<u64>,
     #[command(flatten)]
     sequence: SequenceArgs,
     /// Show the image while it is made in tev, which listens at localhost:14158
@@ -155,6 +163,16 @@ fn error_bound(text: &str) -> Result<f64, String> {
 /// Bad input; files that cannot be written.
 pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     const DEFAULT_SPP: u64 = 64;
+    if args.memory_budget.is_some() {
+        if args.light.one_backend()? == Backend::Gpu {
+            bail!("--memory-budget: the GPU holds the whole scene; leave it away, or use --backend cpu");
+        }
+        if args.sampler == Method::Oracle {
+            bail!("--memory-budget: `oracle` looks at everything beforehand; use another --sampler");
+        }
+        #[cfg(unix)]
+        allocator::give_back_what_is_freed();
+    }
     let format = Format::of(&args.output)?;
     if format == Format::Png && !args.aov.is_empty() {
         bail!("a PNG has no layers for --aov; write an .exr");
@@ -192,17 +210,21 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     if args.build_all {
         loaded.build_all();
     }
-    if let Some(sequence) = &sequence {
-        return sequence::run(args, format, &settings, &loaded, sequence);
+    if let Some(budget) = args.memory_budget {
+        loaded.scene.set_memory_budget(budget);
     }
-    let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
+    if let Some(sequence) = &sequence {
+        return sequence::run(args, format, &settings, loaded, sequence);
+    }
+    let camera = &session::camera(&loaded.scene, args.light.camera.as_deref())?.clone();
+    let (scene, origin) = loaded.give();
     let watch = Watch::rendering();
     let back_end = BackEnd::open(args.light.one_backend()?)?;
-    let mut frames = back_end.start(&loaded.scene, camera, &settings)?;
+    let mut frames = back_end.start(scene, camera, &settings)?;
     if args.stats.is_some() && matches!(back_end, BackEnd::Gpu(_)) && !frames.time_passes() {
         message::note("the adapter has no timestamps: no times of passes in the statistics");
     }
-    let title = format!("manylight {}", loaded.scene.parts.name);
+    let title = format!("manylight {}", frames.scene().parts.name);
     let mut display = args
         .display_server
         .as_ref()
@@ -223,7 +245,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         budget.frames = Some(share.end - share.start);
         shard = Some((part, all));
     }
-    let header = Header::new(&loaded.what, &loaded.scene, camera, &settings, shard);
+    let header = Header::new(&origin.what, frames.scene(), camera, &settings, shard);
     if let Some(path) = &args.resume {
         parts::resume(path, &header, frames.as_mut())?;
     }
@@ -250,7 +272,8 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         display.finish(&image);
     }
     let run = frames.stats();
-    let mut stats = Stats::new(&loaded, &camera.name, &settings, &run, interrupted, &back_end);
+    let state = frames.as_ref();
+    let mut stats = Stats::new(state, &run, &origin, &camera.name, &settings, interrupted, &back_end);
     // Measuring takes about as long as a frame: only where somebody will read the result.
     if args.stats.is_some() {
         stats.measure(frames.as_ref(), args.target_error);
@@ -261,7 +284,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
             let exposure = args.exposure.unwrap_or_else(|| image::auto_exposure(&image));
             let made = Made {
                 film: frames.film(),
-                scene: &loaded.scene,
+                scene: frames.scene(),
                 stats: &stats,
                 settings: &settings,
             };
@@ -280,7 +303,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
             output::write(path, json.as_bytes())?
         }
     }
-    summary(args, &loaded, &settings, &run);
+    summary(args, frames.scene(), &origin, &settings, &run);
     if let Some(target) = args.target_error {
         message::note(report(frames.film(), target));
     }
@@ -417,7 +440,7 @@ fn report(film: &Film, target: f64) -> String {
 }
 
 /// What was done, for people.
-fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &RenderStats) {
+fn summary(args: &RenderArgs, scene: &Scene, origin: &Origin, settings: &Settings, run: &RenderStats) {
     let samples = u64::from(settings.width) * u64::from(settings.height) * run.frames;
     message::note(format!(
         "{}: {} x {}, {} spp in {:.2} s, {:.2} Msamples/s, sampler {}, {} lights, {} triangles \
@@ -429,10 +452,10 @@ fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &Render
         run.render_s,
         samples as f64 / run.render_s.max(1e-9) * 1e-6,
         settings.method.name(),
-        table::thousands(loaded.scene.lights.len() as u64),
-        table::thousands(loaded.scene.triangle_count()),
-        loaded.load_s,
-        loaded.scene.build_s,
+        table::thousands(scene.lights.len() as u64),
+        table::thousands(scene.triangle_count()),
+        origin.load_s,
+        scene.build_s,
         run.light_build_s,
     ));
     if let Some(note) = settings.method.research_note() {
@@ -442,7 +465,19 @@ fn summary(args: &RenderArgs, loaded: &Loaded, settings: &Settings, run: &Render
             run.prepare_s
         ));
     }
-    for skipped in stats::skipped(&loaded.scene, run) {
+    let memory = scene.memory().used();
+    if let Some(budget) = memory.budget_bytes {
+        let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+        message::note(format!(
+            "memory budget {:.1} MiB: at most {:.1} MiB were made on demand, {:.1} MiB are there; made {} times, of these {} again",
+            mib(budget),
+            mib(memory.peak_bytes),
+            mib(memory.resident_bytes),
+            table::thousands(memory.made),
+            table::thousands(memory.made_again),
+        ));
+    }
+    for skipped in stats::skipped(scene, run) {
         message::detail(format!("skipped: {skipped}"));
     }
 }

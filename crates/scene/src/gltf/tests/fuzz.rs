@@ -61,6 +61,9 @@ proptest! {
             }
         }
         if let Ok(parts) = read_bytes("a.glb", &file) {
+            for texture in &parts.textures {
+                prop_assert_eq!(texture.texels.iter().count(), texture.texels.len());
+            }
             let vertices = parts.meshes.iter().flat_map(|m| &m.positions);
             prop_assert!(vertices.into_iter().all(|p| p.is_finite()));
             for mesh in &parts.meshes {

@@ -4,6 +4,7 @@ mod broken;
 mod fuzz;
 mod geometry;
 mod looks;
+mod textures;
 
 use super::read;
 use crate::{SceneError, SceneParts};

@@ -94,7 +94,7 @@ pub(super) fn run(
     args: &RenderArgs,
     format: Format,
     settings: &Settings,
-    loaded: &Loaded,
+    loaded: Loaded,
     sequence: &Sequence,
 ) -> Result<Status> {
     const DEFAULT_SPP: u64 = 64;
@@ -102,7 +102,8 @@ pub(super) fn run(
         return Ok(Status::Done);
     };
     let back_end = BackEnd::open(args.light.one_backend()?)?;
-    let mut renderer = back_end.start(&loaded.scene, first, settings)?;
+    let (scene, origin) = loaded.give();
+    let mut renderer = back_end.start(scene, first, settings)?;
     let budget = Budget::new(&args.budget, DEFAULT_SPP).until(args.target_error, &args.budget);
     // By the first frame, if none is asked for: a film whose exposure jumps from picture to picture flickers.
     let mut exposure = args.exposure;
@@ -116,16 +117,17 @@ pub(super) fn run(
         let film = renderer.film();
         let exposure = *exposure.get_or_insert_with(|| image::auto_exposure(&film.image()));
         let stats = Stats::new(
-            loaded,
+            renderer.as_ref(),
+            &renderer.stats(),
+            &origin,
             &camera.name,
             settings,
-            &renderer.stats(),
             interrupted,
             &back_end,
         );
         let made = Made {
             film,
-            scene: &loaded.scene,
+            scene: renderer.scene(),
             stats: &stats,
             settings,
         };

@@ -1,10 +1,10 @@
 //! The figures of a rendering, for `--stats`.
 
 use crate::machine;
-use crate::session::{BackEnd, Loaded};
+use crate::session::{BackEnd, Origin};
 use render::gpu::PassTime;
 use render::{Choosing, ErrorEstimate, FrameLoop, RenderStats, SampleCounts, Settings};
-use scene::{Report, Scene};
+use scene::{KeptBytes, MemoryUse, Report, Scene};
 use serde::Serialize;
 
 /// All figures of a run. Field names are what scripts rely on.
@@ -46,7 +46,7 @@ pub(super) struct Stats {
     learn_s: f64,
     /// Part of the rendering time that went into learning.
     learn_share: f64,
-    /// What choosing lights cost, timed after the rendering; `None` for methods without a choice.
+    /// What choosing lights cost, timed after the rendering; `None` for methods without a choice, and with a memory budget.
     choosing: Option<Choosing>,
     /// Part of the rendering time that went into choosing.
     choose_share: Option<f64>,
@@ -66,6 +66,12 @@ pub(super) struct Stats {
     /// Meshes whose trees some ray has needed.
     meshes_built: usize,
     meshes: usize,
+    /// What was made on demand.
+    memory: MemoryUse,
+    /// What of the scene is kept whatever the memory budget; film and sampler (`light_bytes`) come on top.
+    kept: KeptBytes,
+    /// Bytes of the image in progress.
+    film_bytes: usize,
     peak_rss_bytes: u64,
     skipped: Vec<String>,
     /// What must be said of results of this method, if anything: it is for research.
@@ -79,20 +85,22 @@ pub(super) struct Stats {
 impl Stats {
     /// Collects them.
     pub(super) fn new(
-        loaded: &Loaded,
+        frames: &dyn FrameLoop<'_>,
+        run: &RenderStats,
+        origin: &Origin,
         camera: &str,
         settings: &Settings,
-        run: &RenderStats,
         interrupted: bool,
         back_end: &BackEnd,
     ) -> Self {
+        let scene = frames.scene();
         let threads = rayon::current_num_threads();
         let sampler = run.sampler.clone().unwrap_or_default();
         // The flag follows the setting, also where the sampler at hand has no use for it and says nothing.
         let asked = settings.light.ignore_below > 0.0;
         let by_setting = || asked.then(|| format!("ignore_below = {}", settings.light.ignore_below));
         Self {
-            scene: loaded.what.clone(),
+            scene: origin.what.clone(),
             camera: camera.into(),
             version: machine::VERSION,
             backend: back_end.to_string(),
@@ -108,8 +116,8 @@ impl Stats {
             seed: settings.seed,
             threads,
             interrupted,
-            load_s: loaded.load_s,
-            build_s: loaded.scene.build_s,
+            load_s: origin.load_s,
+            build_s: scene.build_s,
             light_build_s: run.light_build_s,
             prepare_s: run.prepare_s,
             render_s: run.render_s,
@@ -119,23 +127,26 @@ impl Stats {
             choose_share: None,
             rays_per_s: (run.rays_nearest + run.rays_occluded) as f64 / run.render_s.max(f64::MIN_POSITIVE),
             passes: Vec::new(),
-            lights: loaded.scene.lights.len(),
-            triangles: loaded.scene.triangle_count(),
+            lights: scene.lights.len(),
+            triangles: scene.triangle_count(),
             rays_nearest: run.rays_nearest,
             rays_occluded: run.rays_occluded,
             nonfinite_samples: run.nonfinite_samples,
             cells: sampler.cells,
             min_probability: sampler.min_probability,
             light_bytes: sampler.bytes,
-            bvh_bytes: loaded.scene.bvh().bytes(),
-            meshes_built: loaded.scene.bvh().built(),
-            meshes: loaded.scene.parts.meshes.len(),
+            bvh_bytes: scene.bvh().bytes(),
+            meshes_built: scene.bvh().built(),
+            meshes: scene.parts.meshes.len(),
+            memory: scene.memory().used(),
+            kept: scene.kept_bytes(),
+            film_bytes: frames.film().bytes(),
             peak_rss_bytes: machine::peak_rss_bytes(),
-            skipped: skipped(&loaded.scene, run),
+            skipped: skipped(scene, run),
             research: settings.method.research_note(),
             biased: sampler.biased.or_else(by_setting),
             settings: settings.clone(),
-            report: loaded.scene.parts.report.clone(),
+            report: scene.parts.report.clone(),
         }
     }
 
@@ -149,7 +160,11 @@ impl Stats {
             self.converged = Some(film.converged(target));
         }
         let frame_s = self.render_s / self.spp.max(1) as f64;
-        self.choosing = frames.choosing();
+        // Its rays would go on making what a memory budget has no room for.
+        self.choosing = match self.memory.budget_bytes {
+            None => frames.choosing(),
+            Some(_) => None,
+        };
         self.choose_share = self.choosing.map(|choosing| choosing.share(frame_s, self.threads));
         self.passes = frames.pass_times();
     }

@@ -136,6 +136,19 @@ pub(super) const ALL: [Skip; 13] = [
     },
 ];
 
+/// What is left out until a ray needs it; done all the same by [`scene::Scene::build_all`], which is no change of the scene.
+pub(super) const ON_DEMAND: Skip = Skip {
+    name: "made on demand: trees, records, textures, meshes of large files",
+    forced_by: "all is made beforehand: load and first frame",
+    applies: |scene| {
+        let parts = &scene.parts;
+        parts.instances.iter().any(|instance| !instance.identity)
+            || parts.textures.iter().any(|texture| texture.texels.is_deferred())
+    },
+    skipped: unchanged,
+    forced: unchanged,
+};
+
 fn unchanged(_: &mut SceneParts, _: &mut Settings) {}
 
 fn is_matt(material: &Material) -> bool {
@@ -206,7 +219,7 @@ fn add_texel(parts: &mut SceneParts, texel: [u8; 4], srgb: bool) -> TextureRef {
         name: "one texel".into(),
         width: 1,
         height: 1,
-        texels: vec![texel],
+        texels: vec![texel].into(),
         srgb,
         wrap: Default::default(),
         nearest: false,

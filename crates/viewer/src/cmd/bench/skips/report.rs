@@ -22,6 +22,7 @@ pub(super) fn table(lines: &[Line]) -> String {
                 format!("{:.3} to {:.3}", line.quartiles[0], line.quartiles[1]),
                 optional(line.shadow_rays),
                 optional(line.noise),
+                optional(line.memory),
                 match line.same {
                     true if line.difference == 0.0 => "equal".into(),
                     true if line.difference < 1e-9 => "but for rounding".into(),
@@ -44,11 +45,13 @@ pub(super) fn table(lines: &[Line]) -> String {
         "half of all",
         "shadow rays x",
         "noise x",
+        "memory x",
         "images",
     ];
     align(&header, &rows, 4)
         + "forced x: processor time of a frame with the thing forced over that of one without it (median over blocks of four frames, and where half of \
-           them lie); noise x: estimated relMSE at equal samples\n"
+           them lie); for what is made on demand, of loading and the first frame; noise x: estimated relMSE at equal samples; memory x: bytes of \
+           trees, records, textures and meshes that were made on demand or beforehand\n"
 }
 
 /// All lines, and where they were measured.
