@@ -123,7 +123,14 @@ fn layers_and_sizes_change_between_frames() {
         ..Settings::default()
     };
     let mut changed = [None, Some(gpu)].map(|gpu| start(&scene, &settings, gpu));
-    for (width, height, aovs) in [(36, 48, true), (48, 36, false), (SIZE.0, SIZE.1, true)] {
+    let sizes = [
+        (1, 1, true),
+        (36, 48, true),
+        (2, 1, false),
+        (48, 36, false),
+        (SIZE.0, SIZE.1, true),
+    ];
+    for (width, height, aovs) in sizes {
         for frames in &mut changed {
             (0..3).for_each(|_| frames.render_frame());
             frames.set_film(width, height, aovs).expect("a valid size");

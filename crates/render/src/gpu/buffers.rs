@@ -51,7 +51,7 @@ pub(super) fn written(gpu: &Gpu, label: &str, size: u64) -> Result<wgpu::Buffer,
     }))
 }
 
-/// Copies a buffer to the CPU and hands its bytes to `look`; `None` if the device is lost.
+/// Copies a buffer to the CPU and hands its bytes to `look`, those included that make up the least size; `None` if the device is lost.
 pub(super) fn read<T>(gpu: &Gpu, buffer: &wgpu::Buffer, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
     read_start(gpu, buffer, buffer.size() as usize, look)
 }

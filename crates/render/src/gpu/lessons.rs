@@ -196,9 +196,10 @@ pub(super) fn read_all(
     observations: &wgpu::Buffer,
     [width, height, slots]: [u32; 3],
 ) -> Option<Vec<Vec<Observation>>> {
-    read(gpu, observations, |bytes| {
+    let slots = slots as usize;
+    let count = width as usize * height as usize * slots;
+    read_start(gpu, observations, count * size_of::<PackedObservation>(), |bytes| {
         let all: &[PackedObservation] = bytemuck::cast_slice(bytes);
-        let slots = slots as usize;
         let starts = |end: u32| (0..end).step_by(TILE_SIZE as usize);
         let tile = |x0: u32, y0: u32| {
             let rows = y0..(y0 + TILE_SIZE).min(height);

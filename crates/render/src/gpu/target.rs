@@ -1,6 +1,6 @@
 //! What frames of one size write, and reading it back.
 
-use super::buffers::{read, written};
+use super::buffers::{read_start, written};
 use super::device::Gpu;
 use super::layout::{AovPixel, FilmPixel, PackedObservation};
 use super::lessons::{LessonPasses, Lessons};
@@ -71,7 +71,8 @@ impl Target {
     pub(super) fn read(&self, gpu: &Gpu, film: &Film) -> (Film, Counters) {
         let mut read_back = film.clone();
         let mut counters = Counters::default();
-        read(gpu, &self.film, |bytes| {
+        let pixels = self.size[0] as usize * self.size[1] as usize;
+        read_start(gpu, &self.film, pixels * size_of::<FilmPixel>(), |bytes| {
             let pixels: &[FilmPixel] = bytemuck::cast_slice(bytes);
             if film.spp() > 0 {
                 read_back.load(|pixel| (pixels[pixel].sums(), pixels[pixel].count, pixels[pixel].weight()));
@@ -84,7 +85,7 @@ impl Target {
         });
         if let (Some(aovs), true) = (&self.aovs, film.spp() > 0) {
             let count = u32::try_from(film.spp()).unwrap_or(u32::MAX);
-            read(gpu, aovs, |bytes| {
+            read_start(gpu, aovs, pixels * size_of::<AovPixel>(), |bytes| {
                 let pixels: &[AovPixel] = bytemuck::cast_slice(bytes);
                 read_back.load_aovs(|pixel| pixels[pixel].get(count));
             });
