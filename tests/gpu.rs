@@ -298,11 +298,10 @@ fn what_the_gpu_lacks_is_refused_with_the_remedy() {
     let Some(gpu) = gpu() else { return };
     let scene = scene::load("demo:one-light").expect("it is generated");
     type Change = fn(&mut Settings);
-    let cases: [(Change, &str); 5] = [
+    let cases: [(Change, &str); 4] = [
         (|s| s.method = Method::Exact, "exact"),
         (|s| s.pixel_sampler = sampling::PixelSampler::Halton, "halton"),
         (|s| s.pixel_filter = render::PixelFilter::Gaussian, "filter"),
-        (|s| s.aovs = true, "auxiliary"),
         (|s| s.adaptive_pixels = true, "--target-error"),
     ];
     for (change, word) in cases {
@@ -334,4 +333,49 @@ fn a_lost_device_is_an_error_and_no_panic() {
     let error = frames.error().expect("the device is gone").to_string();
     assert!(error.contains("lost"), "{error}");
     assert_eq!(frames.film().spp(), 0);
+}
+
+/// On devices of their own. Whatever is going on when one goes: frames, lessons, films read back, other sizes.
+#[test]
+fn devices_that_are_lost_while_they_render_are_errors_and_no_panics() {
+    if gpu().is_none() {
+        return;
+    }
+    let scene = scene::load("demo:points:64").expect("it is generated");
+    let camera = &scene.parts.cameras[0];
+    let settings = Settings {
+        width: 32,
+        height: 32,
+        method: Method::Sampled(SamplerKind::Table),
+        aovs: true,
+        ..Settings::default()
+    };
+    for after_ms in [0, 5, 50, 300] {
+        let gpu = Gpu::open().expect("it was opened before");
+        let mut frames = render::gpu::renderer(&gpu, &scene, camera, &settings).expect("it fits");
+        let killer = std::thread::spawn(move || {
+            std::thread::sleep(std::time::Duration::from_millis(after_ms));
+            gpu.destroy();
+        });
+        let mut width = 32;
+        while frames.error().is_none() {
+            frames.render_frame();
+            assert!(frames.film().image().pixels.iter().flatten().all(|v| v.is_finite()));
+            if frames.spp() == 5 {
+                width ^= 16;
+                frames.set_film(width, 32, true).expect("a valid size");
+            }
+        }
+        killer.join().expect("it does not panic");
+        let error = frames.error().expect("the device is gone").to_string();
+        assert!(error.contains("lost") && error.contains("--backend cpu"), "{error}");
+        // And all else that may be asked of it.
+        frames.set_camera(camera);
+        frames.set_scene((&scene).into()).expect("the same lights");
+        frames.set_film(8, 8, false).expect("a valid size");
+        assert!(!frames.render_frame_unless(&std::sync::atomic::AtomicBool::new(false)));
+        frames.wait();
+        assert!(frames.film().image().pixels.iter().flatten().all(|v| v.is_finite()));
+        assert!(frames.error().is_some());
+    }
 }

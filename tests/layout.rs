@@ -2,16 +2,16 @@
 
 use light_cache::Scheme;
 use render::gpu::{
-    FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run, files, link,
+    AovPixel, FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run, files, link,
 };
 use scene::packed::{PackedLight, SceneParams};
 use std::mem::offset_of;
 use std::path::Path;
 use wgpu::naga::{Module, TypeInner};
 
-/// Every pass with every sampler is one module.
-fn module(pass: &str, scheme: Scheme) -> Module {
-    let text = link(&format!("#import \"pass/{pass}.wgsl\"\n"), scheme).expect("every import has a file");
+/// Every pass with every sampler is one module, with auxiliary images or without.
+fn module(pass: &str, scheme: Scheme, aovs: bool) -> Module {
+    let text = link(&format!("#import \"pass/{pass}.wgsl\"\n"), scheme, aovs).expect("every import has a file");
     wgpu::naga::front::wgsl::parse_str(&text).unwrap_or_else(|error| panic!("{}", error.emit_to_string(&text)))
 }
 
@@ -40,11 +40,12 @@ macro_rules! same_layout {
 
 #[test]
 fn records_lie_alike_in_memory() {
-    let module = &module("path", Scheme::Uniform);
+    let module = &module("path", Scheme::Uniform, true);
     same_layout!(module, "FrameParams", FrameParams: origin_ws, width, corner_ws, height, step_x_ws, frame, step_y_ws, weight,
         seed, max_bounces, light_samples, clear, candidates, slots, controls);
     same_layout!(module, "FilmPixel", FilmPixel: hi, lo, weight_hi, weight_lo, count, nonfinite, rays_nearest, rays_occluded,
         pad0, pad1, control);
+    same_layout!(module, "AovPixel", AovPixel: hi, lo, depth_hi, depth_lo, hits, light);
     same_layout!(module, "PixelControl", PixelControl: share, count, mean_found, mean_control, found_sq, control_sq, mixed, scale);
     same_layout!(module, "Observation", PackedObservation: position_ws, light, normal_ws, flags, unshadowed, irradiance, pmf,
         weight);
@@ -52,7 +53,7 @@ fn records_lie_alike_in_memory() {
         textures, emitter_lights, albedo, srgb, light_count, radius, area_lights, pad0, pad1);
     same_layout!(module, "Light", PackedLight: position_ws, kind, edge1_ws, area, edge2_ws, range, normal_ws, cos_inner,
         intensity, cos_outer, primitive, pad);
-    let module = &self::module("thin", Scheme::Uniform);
+    let module = &self::module("thin", Scheme::Uniform, false);
     same_layout!(module, "LessonParams", LessonParams: frame, stride, pad0, pad1);
     same_layout!(module, "LessonCounters", LessonCounters: observed, kept, runs, pad);
     same_layout!(module, "Run", Run: frame, tile, first, count);
@@ -61,19 +62,20 @@ fn records_lie_alike_in_memory() {
 #[test]
 fn passes_are_valid_and_keep_to_the_default_limits() {
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
-    let paths = [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive].map(|scheme| ("path", scheme));
-    for (pass, scheme) in paths
-        .into_iter()
-        .chain([("tally", Scheme::Uniform), ("thin", Scheme::Uniform)])
-    {
-        let module = module(pass, scheme);
+    let schemes = [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive];
+    let paths = schemes.map(|scheme| [false, true].map(|aovs| ("path", scheme, aovs)));
+    let others = ["tally", "thin"].map(|pass| (pass, Scheme::Uniform, false));
+    for (pass, scheme, aovs) in paths.into_iter().flatten().chain(others) {
+        let module = module(pass, scheme, aovs);
         let valid = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
         assert!(valid.is_ok(), "{pass} {scheme:?}: {:?}", valid.err());
         let storage = module
             .global_variables
             .iter()
             .filter(|(_, variable)| matches!(variable.space, wgpu::naga::AddressSpace::Storage { .. }));
-        assert!(storage.count() <= wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize);
+        // Auxiliary images are asked for by name, and refused where there is one buffer too few.
+        let most = wgpu::Limits::default().max_storage_buffers_per_shader_stage as usize + usize::from(aovs);
+        assert!(storage.count() <= most, "{pass} {scheme:?}");
     }
 }
 

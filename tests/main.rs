@@ -10,6 +10,8 @@ mod closed_form;
 mod deferred;
 /// The GPU back end against the CPU.
 mod gpu;
+/// Its auxiliary images.
+mod gpu_aovs;
 /// Records that Rust and the shaders share.
 mod layout;
 /// Placed meshes and holes on the GPU back end.

@@ -186,10 +186,36 @@ fn walking_reloading_resizing_to_nothing_and_random_inputs_do_no_harm() {
 }
 
 #[test]
-fn a_lost_device_ends_with_exit_code_4_and_a_remedy() {
+fn a_window_whose_device_is_lost_goes_on_with_another_one() {
     let Some(display) = Display::start() else { return };
     let temporary = tempfile::tempdir().expect("a temporary folder");
-    let Some(output) = display.view(temporary.path(), "demo:rooms:64", "2 lose-device\n500 quit\n") else {
+    let folder = temporary.path();
+    // Panels included: their letters were in the memory of the device that is gone.
+    let script = "0 key f2\n0 key n\n0 settle 4\n0 key x\n1 key space\n1 key f2\n1 key f1\n20 key f3\n60 screenshot before.png\n\
+                  61 lose-device window\n100 screenshot after.png\n101 quit\n";
+    let Some(output) = display.view(folder, "demo:rooms:64", script) else {
+        return;
+    };
+    succeeded(&output);
+    assert!(
+        stderr(&output).contains("goes on with another one"),
+        "{}",
+        stderr(&output)
+    );
+    let [before, after] = ["before.png", "after.png"].map(|name| decode(&folder.join(name)));
+    assert_eq!(before.len(), after.len());
+    // The figures in the corner are not the same ones.
+    let different = before.iter().zip(&after).filter(|(a, b)| a.abs_diff(**b) > 2).count();
+    assert!(different * 50 < before.len(), "{different} of {} differ", before.len());
+    assert!(after.iter().any(|&value| value > 0), "black");
+}
+
+#[test]
+fn a_window_that_loses_one_device_after_the_other_ends_with_exit_code_4_and_a_remedy() {
+    let Some(display) = Display::start() else { return };
+    let temporary = tempfile::tempdir().expect("a temporary folder");
+    let script = "2 lose-device window\n20 lose-device window\n500 quit\n";
+    let Some(output) = display.view(temporary.path(), "demo:rooms:64", script) else {
         return;
     };
     let text = stderr(&output);
@@ -205,7 +231,8 @@ fn decode(path: &Path) -> Vec<u8> {
     image::open(path).expect("a PNG").into_rgb8().into_raw()
 }
 
-/// The mean of 160x120 pixels of 4 samples or more is within a few percent of that of many.
+/// The mean of 160x120 pixels of 4 samples or more is within a few percent of that of many. Views of auxiliary images are the CPU's, and when the
+/// GPU is taken away in the middle of a frame the CPU goes on, until the GPU is chosen again.
 #[test]
 fn the_window_shows_what_the_gpu_renders() {
     let Some(display) = Display::start() else { return };
@@ -215,7 +242,10 @@ fn the_window_shows_what_the_gpu_renders() {
     let temporary = tempfile::tempdir().expect("a temporary folder");
     let folder = temporary.path();
     let on_gpu = ["--backend", "gpu", "--sampler", "uniform"];
-    let script = "0 settle 4\n1 screenshot gpu.exr\n2 sampler octree\n3 screenshot octree.exr\n4 quit\n";
+    let script = "0 settle 4\n0 key f2\n1 screenshot gpu.exr\n1 view normal\n1 settle 4\n2 screenshot gpu.png\n3 report gpu.json\n\
+                  3 backend cpu\n3 settle 4\n4 screenshot cpu.png\n5 report cpu.json\n5 backend gpu\n5 view image\n5 settle 2\n\
+                  6 lose-device renderer\n6 settle 100\n7 report lost.json\n7 backend gpu\n7 settle 2\n8 report again.json\n\
+                  8 sampler octree\n9 screenshot octree.exr\n10 quit\n";
     let Some(output) = display.view_with(folder, "demo:one-light", script, &on_gpu) else {
         return;
     };
@@ -226,6 +256,24 @@ fn the_window_shows_what_the_gpu_renders() {
         "{}",
         stderr(&output)
     );
+    assert!(
+        stderr(&output).contains("was lost") && stderr(&output).contains("the CPU goes on"),
+        "{}",
+        stderr(&output)
+    );
+    for (report, expected) in [("gpu", "gpu"), ("cpu", "cpu"), ("lost", "cpu"), ("again", "gpu")] {
+        let text = std::fs::read_to_string(folder.join(report).with_extension("json")).expect("a report");
+        let report: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(report["rendered_on"], expected, "{text}");
+    }
+    let [gpu, cpu] = ["gpu.png", "cpu.png"].map(|name| decode(&folder.join(name)));
+    let apart: u64 = gpu.iter().zip(&cpu).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
+    assert!(
+        apart < 2 * gpu.len() as u64,
+        "normals differ by {apart} of {}",
+        gpu.len()
+    );
+    assert!(gpu.iter().any(|&value| value > 0), "black");
     let arguments = [
         "render",
         "demo:one-light",

@@ -3,8 +3,10 @@
 #import "lib/control.wgsl"
 #import "lib/mis.wgsl"
 #import "lib/sequence.wgsl"
+#import "lib/sum.wgsl"
 #import "lib/wide.wgsl"
 #import "light_cache/sampler.wgsl"
+#import "probe/probe.wgsl"
 #import "record/film.wgsl"
 #import "record/frame.wgsl"
 #import "record/ray.wgsl"
@@ -60,6 +62,8 @@ struct Log {
     rays_occluded: u32,
     observations: u32,
     pixel: u32,
+    // The light that was chosen at the last vertex, the first of several, or NONE.
+    light: u32,
 }
 
 // A vertex joined with a point on a light, visibility unknown.
@@ -186,6 +190,9 @@ fn direct_light(local: Local, vertex: Vertex, numbers: LightNumbers, count: f32,
         (*log).rays_occluded += 1u;
         visible = !occluded(connection.shadow_ray, vertex.surface.id, connection.to_id);
     }
+    if (*log).light == NONE && (connection.exists || candidates == 1u) {
+        (*log).light = choice.light;
+    }
     observe(vertex, choice.light, pmf, connection, visible, log);
     var direct = PathSample(vec3<f32>(0.0), vec3<f32>(0.0));
     if candidates == 1u {
@@ -269,6 +276,7 @@ fn trace_path(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> PathSample {
             select(1u, frame.candidates, RESAMPLES && glossy),
         );
         let count = select(1u, frame.light_samples, bounce == 0u);
+        (*log).light = NONE;
         if scene.light_count > 0u {
             for (var k = 0u; k < count; k++) {
                 let index = select(frame.frame, frame.frame * frame.light_samples + k, bounce == 0u);
@@ -281,6 +289,9 @@ fn trace_path(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> PathSample {
                 brought.radiance += direct.radiance;
                 brought.control += direct.control;
             }
+        }
+        if bounce == 0u {
+            probe_first_hit(pixel, surface, hit.t, (*log).light);
         }
         if !continues {
             break;
@@ -312,7 +323,6 @@ fn trace_path(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> PathSample {
     return brought;
 }
 
-// twin: crates/sampling/src/sum.rs two_sum
 fn add_to_film(pixel: u32, brought: PathSample, log: Log) {
     var sums = film[pixel];
     var radiance = brought.radiance;
@@ -340,12 +350,13 @@ fn add_to_film(pixel: u32, brought: PathSample, log: Log) {
     if is_finite(size) && size < largest {
         let y = luminance(radiance);
         let x = vec4<f32>(radiance, min(y * y, largest)) * frame.weight;
-        let first = two_sum(sums.hi, x);
-        let second = two_sum(first.sum, first.error + sums.lo);
-        sums.hi = second.sum;
-        sums.lo = second.error;
-        let weights = two_sum(vec4<f32>(sums.weight_hi), vec4<f32>(frame.weight));
-        let weight = two_sum(weights.sum, weights.error + sums.weight_lo);
+        let pair = add_to_pair(TwoSum(sums.hi, sums.lo), x);
+        sums.hi = pair.sum;
+        sums.lo = pair.error;
+        let weight = add_to_pair(
+            TwoSum(vec4<f32>(sums.weight_hi), vec4<f32>(sums.weight_lo)),
+            vec4<f32>(frame.weight),
+        );
         sums.weight_hi = weight.sum.x;
         sums.weight_lo = weight.error.x;
         sums.count += 1u;
@@ -353,18 +364,6 @@ fn add_to_film(pixel: u32, brought: PathSample, log: Log) {
         sums.nonfinite += 1u;
     }
     film[pixel] = sums;
-}
-
-struct TwoSum {
-    sum: vec4<f32>,
-    error: vec4<f32>,
-}
-
-fn two_sum(a: vec4<f32>, b: vec4<f32>) -> TwoSum {
-    let sum = a + b;
-    let b_part = sum - a;
-    let a_part = sum - b_part;
-    return TwoSum(sum, (a - a_part) + (b - b_part));
 }
 
 @compute @workgroup_size(8, 8)
@@ -379,7 +378,8 @@ fn path(@builtin(global_invocation_id) id: vec3<u32>) {
     let offset = vec2<f32>(sequence_unit(numbers, 0u), sequence_unit(numbers, 1u));
     let at = vec2<f32>(f32(column), f32(row)) + offset;
     let direction_ws = normalize(frame.corner_ws + frame.step_x_ws * at.x + frame.step_y_ws * at.y);
-    var log = Log(0u, 0u, 0u, pixel);
+    var log = Log(0u, 0u, 0u, pixel, NONE);
+    probe_pixel(pixel);
     let brought = trace_path(pixel, Ray(frame.origin_ws, direction_ws, FAR), &log);
     add_to_film(pixel, brought, log);
     if LEARNS {

@@ -99,11 +99,14 @@ struct PixelRecord {
 
 /// Auxiliary sums of one pixel: albedo, normal, position, emission, depth.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-struct AovRecord {
-    sums: [f64; 13],
-    count: u32,
-    hits: u32,
-    light: i64,
+pub(crate) struct AovRecord {
+    pub(crate) sums: [f64; 13],
+    /// Samples.
+    pub(crate) count: u32,
+    /// Those that hit something.
+    pub(crate) hits: u32,
+    /// Chosen by the last one; -1 for none.
+    pub(crate) light: i64,
 }
 
 impl AovRecord {
@@ -140,6 +143,13 @@ pub(crate) struct Tile {
 }
 
 impl Tile {
+    /// Where its pixels lie in a film of `film_width` columns, counted row by row.
+    fn places(&self, film_width: u32) -> impl Iterator<Item = usize> + use<> {
+        let (x0, y0, width) = (self.x0, self.y0, self.width);
+        let rows = y0..y0 + self.height;
+        rows.flat_map(move |y| (x0..x0 + width).map(move |x| (y * film_width + x) as usize))
+    }
+
     /// Adds a sample to the tile's pixel `index`, counted row by row. Samples that are not finite are left out;
     /// returns whether it was finite.
     #[inline]
@@ -360,12 +370,28 @@ impl Film {
     pub(crate) fn load(&mut self, of: impl Fn(usize) -> ([f64; 4], u32, f64)) {
         let width = self.width;
         for tile in &mut self.tiles {
-            let places = (0..tile.height).flat_map(|row| (0..tile.width).map(move |column| (row, column)));
-            for (pixel, (row, column)) in tile.pixels.iter_mut().zip(places) {
-                let (sums, count, weight) = of(((tile.y0 + row) * width + tile.x0 + column) as usize);
+            let places = tile.places(width);
+            for (pixel, place) in tile.pixels.iter_mut().zip(places) {
+                let (sums, count, weight) = of(place);
                 *pixel = PixelRecord { sums, count, weight };
             }
         }
+    }
+
+    /// Likewise the auxiliary sums, if they are kept.
+    pub(crate) fn load_aovs(&mut self, of: impl Fn(usize) -> AovRecord) {
+        let width = self.width;
+        for tile in &mut self.tiles {
+            let places = tile.places(width);
+            for (pixel, place) in tile.aovs.iter_mut().zip(places) {
+                *pixel = of(place);
+            }
+        }
+    }
+
+    /// Whether auxiliary images are kept.
+    pub(crate) fn has_aovs(&self) -> bool {
+        self.has_aovs
     }
 
     /// The mean image so far; black before the first frame.

@@ -3,7 +3,6 @@
 use super::device::Gpu;
 use crate::RenderError;
 use wgpu::BufferUsages;
-use wgpu::util::DeviceExt;
 
 /// Least size of a buffer: bindings of nothing are not allowed.
 const LEAST: u64 = 256;
@@ -16,29 +15,24 @@ pub(super) fn storage(gpu: &Gpu, label: &str, bytes: &[u8]) -> Result<wgpu::Buff
     if let Some(error) = gpu.refuses(label, bytes.len() as u64) {
         return Err(error);
     }
-    let padding;
-    let contents = if bytes.len() < LEAST as usize {
-        let mut padded = bytes.to_vec();
-        padded.resize(LEAST as usize, 0);
-        padding = padded;
-        &padding
-    } else {
-        bytes
-    };
-    Ok(gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
-        label: Some(label),
-        contents,
-        usage: BufferUsages::STORAGE | BufferUsages::COPY_DST,
-    }))
+    Ok(filled(gpu, label, bytes, BufferUsages::STORAGE))
 }
 
 /// A uniform buffer that holds `bytes`.
 pub(super) fn uniform(gpu: &Gpu, label: &str, bytes: &[u8]) -> wgpu::Buffer {
-    gpu.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+    filled(gpu, label, bytes, BufferUsages::UNIFORM)
+}
+
+/// A buffer that holds `bytes`, a multiple of 4. Not mapped at creation: that panics if the device has just been lost.
+fn filled(gpu: &Gpu, label: &str, bytes: &[u8], usage: BufferUsages) -> wgpu::Buffer {
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
-        contents: bytes,
-        usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-    })
+        size: (bytes.len() as u64).max(LEAST),
+        usage: usage | BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, bytes);
+    buffer
 }
 
 /// A storage buffer of zeros that the device writes.
@@ -57,7 +51,7 @@ pub(super) fn written(gpu: &Gpu, label: &str, size: u64) -> Result<wgpu::Buffer,
     }))
 }
 
-/// Copies a buffer to the CPU and hands its bytes to `look`; `None` if the device is lost.
+/// Copies a buffer to the CPU and hands its bytes to `look`, those included that make up the least size; `None` if the device is lost.
 pub(super) fn read<T>(gpu: &Gpu, buffer: &wgpu::Buffer, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
     read_start(gpu, buffer, buffer.size() as usize, look)
 }

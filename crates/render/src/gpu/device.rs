@@ -11,6 +11,9 @@ use wgpu::Features;
 const NO_ADAPTER: &str =
     "install a Vulkan driver (Linux: mesa-vulkan-drivers has one for processors), or render with --backend cpu";
 
+/// Storage buffers that the path pass binds when it makes auxiliary images: one more than by default.
+const BUFFERS_WITH_AOVS: u32 = 9;
+
 /// An adapter that this machine has.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct AdapterInfo {
@@ -89,11 +92,14 @@ impl Gpu {
         };
         let info = adapter.get_info();
         let has = adapter.limits();
-        // Of the limits only those that let larger scenes in are raised.
+        // Of the limits only those that let larger scenes in, and auxiliary images, are raised.
+        let default = wgpu::Limits::default();
+        let buffers = has.max_storage_buffers_per_shader_stage.min(BUFFERS_WITH_AOVS);
         let limits = wgpu::Limits {
+            max_storage_buffers_per_shader_stage: buffers.max(default.max_storage_buffers_per_shader_stage),
             max_storage_buffer_binding_size: has.max_storage_buffer_binding_size,
             max_buffer_size: has.max_buffer_size,
-            ..wgpu::Limits::default()
+            ..default
         };
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("render"),
@@ -129,6 +135,11 @@ impl Gpu {
     /// Which adapter it is.
     pub fn info(&self) -> &AdapterInfo {
         &self.info
+    }
+
+    /// Whether it binds as many buffers at a time as auxiliary images need.
+    pub(super) fn binds_aovs(&self) -> bool {
+        self.device.limits().max_storage_buffers_per_shader_stage >= BUFFERS_WITH_AOVS
     }
 
     /// Gives the device up, as if it had been taken away: everything that renders on it fails from now on.

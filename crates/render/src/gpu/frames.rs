@@ -1,39 +1,31 @@
 //! Frames on the device, and learning from them.
 
-use super::buffers::{read, storage, uniform, written};
 use super::device::Gpu;
-use super::layout::{FilmPixel, FrameParams, PackedObservation};
-use super::lessons::{LessonPasses, Lessons, read_all};
-use super::scene::SceneBuffers;
+use super::layout::FrameParams;
+use super::lessons::{LessonPasses, read_all};
+use super::path_pass::PathPass;
+use super::refusal;
+use super::target::Target;
 use super::timing::{Pass, PassTime, Timer};
-use super::{refusal, shader};
 use crate::choosing::Choosing;
 use crate::direct::OneLight;
 use crate::frame::{Drawn, Eye, Frames};
 use crate::path::{Counters, sequence_since};
-use crate::{Film, Method, RenderError, Settings};
+use crate::{Film, RenderError, Settings};
 use ::scene::Scene;
-use light_cache::{CellRecord, LightRecord, LightSampler, Packed, SamplerStats, ShadingPoint, Thinning};
+use light_cache::{CellRecord, LightRecord, LightSampler, SamplerStats, ShadingPoint, Thinning};
 use std::cell::OnceCell;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-/// Side of a workgroup of `path.wgsl`.
-const GROUP: u32 = 8;
 
 /// Frames with one light per vertex, rendered on the device.
 pub(super) struct GpuFrames<S> {
     gpu: Arc<Gpu>,
     /// The sampler, and what it has of the CPU's frames.
     drawn: Drawn<OneLight<S>>,
-    pipeline: wgpu::ComputePipeline,
+    pass: PathPass,
     /// `None` for samplers that do not learn.
     lesson_passes: Option<LessonPasses>,
-    params: wgpu::Buffer,
-    frame_group: wgpu::BindGroup,
-    scene_group: wgpu::BindGroup,
-    cache: wgpu::Buffer,
-    cache_group: wgpu::BindGroup,
     target: Option<Target>,
     /// The last frame: no more than one is under way while the next is prepared.
     submitted: Option<wgpu::SubmissionIndex>,
@@ -47,17 +39,6 @@ pub(super) struct GpuFrames<S> {
     failure: Option<RenderError>,
 }
 
-/// What a frame of one size writes.
-struct Target {
-    pixels: u64,
-    film: wgpu::Buffer,
-    observations: wgpu::Buffer,
-    group: wgpu::BindGroup,
-    /// Columns, rows, and observations that a pixel has room for.
-    size: [u32; 3],
-    lessons: Option<Lessons>,
-}
-
 impl<S: LightSampler> GpuFrames<S> {
     /// Uploads scene and sampler and compiles the shader.
     ///
@@ -67,27 +48,13 @@ impl<S: LightSampler> GpuFrames<S> {
         let Some(packed) = sampler.pack() else {
             return Err(refusal(format!("the sampler '{}'", settings.method.name())));
         };
-        let buffers = SceneBuffers::new(&gpu, scene)?;
-        let pipeline = compile(&gpu, &sampler, &packed, &buffers, settings)?;
+        let pass = PathPass::new(&gpu, scene, &sampler, &packed, settings)?;
         let lesson_passes = S::LEARNS.then(|| LessonPasses::new(&gpu)).transpose()?;
-        gpu.keep_pipelines();
-        let params = uniform(&gpu, "frame", bytemuck::bytes_of(&FrameParams::default()));
-        let sobol = uniform(
-            &gpu,
-            "sobol rows",
-            bytemuck::cast_slice(sampling::sobol::reversed_rows()),
-        );
-        let cache = storage(&gpu, "light sampler", bytemuck::cast_slice(&packed.words))?;
         let frames = Self {
-            frame_group: group(&gpu, &pipeline, 0, &[(0, &params), (1, &sobol)]),
-            scene_group: group(&gpu, &pipeline, 1, &buffers.bindings()),
-            cache_group: group(&gpu, &pipeline, 2, &[(0, &cache)]),
             drawn: Drawn::new(OneLight(sampler)),
             gpu,
-            pipeline,
+            pass,
             lesson_passes,
-            params,
-            cache,
             target: None,
             submitted: None,
             timer: None,
@@ -102,33 +69,30 @@ impl<S: LightSampler> GpuFrames<S> {
         }
     }
 
-    /// Makes room for what frames of this size write, if it is not there.
-    fn target(&self, eye: &Eye<'_>, pixels: u64) -> Result<Target, RenderError> {
+    /// Makes room for what the coming frames write, if it is not there.
+    fn make_room(&mut self, eye: &Eye<'_>, film: &Film) -> Result<(), RenderError> {
         let slots = if S::LEARNS {
             eye.light_samples + eye.max_bounces
         } else {
             0
         };
-        let film = written(&self.gpu, "film", pixels * size_of::<FilmPixel>() as u64)?;
-        let observations = written(
-            &self.gpu,
-            "observations of a frame",
-            pixels * u64::from(slots) * size_of::<PackedObservation>() as u64,
-        )?;
-        let group = group(&self.gpu, &self.pipeline, 3, &[(0, &film), (1, &observations)]);
         let size = [eye.image_width, eye.image_height, slots];
-        let lessons = match &self.lesson_passes {
-            Some(passes) => Some(Lessons::new(&self.gpu, passes, &self.params, &observations, size)?),
-            None => None,
-        };
-        Ok(Target {
-            pixels,
-            film,
-            observations,
-            group,
-            size,
-            lessons,
-        })
+        let aovs = film.has_aovs();
+        if self.target.as_ref().is_some_and(|target| target.is_for(size, aovs)) {
+            return Ok(());
+        }
+        self.counted = Frames::counters(self, film);
+        self.film = OnceCell::new();
+        // What the sampler has not learned from yet is not lost.
+        let before = self.target.take().and_then(|target| target.lessons);
+        let kept = before.map_or_else(Vec::new, |lessons| lessons.into_kept(&self.gpu));
+        self.pass.set_aovs(&self.gpu, aovs)?;
+        let mut target = Target::new(&self.gpu, &self.pass, self.lesson_passes.as_ref(), size, aovs)?;
+        if let Some(lessons) = &mut target.lessons {
+            lessons.go_on_with(kept);
+        }
+        self.target = Some(target);
+        Ok(())
     }
 
     /// Submits a frame, and waits for the one before.
@@ -161,21 +125,15 @@ impl<S: LightSampler> GpuFrames<S> {
         };
         self.gpu
             .queue
-            .write_buffer(&self.params, 0, bytemuck::bytes_of(&params));
+            .write_buffer(&self.pass.params, 0, bytemuck::bytes_of(&params));
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("path") });
         {
             let mut pass = Pass::Path.begin(&mut encoder, self.timer.as_ref());
-            pass.set_pipeline(&self.pipeline);
-            for (index, group) in [&self.frame_group, &self.scene_group, &self.cache_group, &target.group]
-                .into_iter()
-                .enumerate()
-            {
-                pass.set_bind_group(index as u32, group, &[]);
-            }
-            pass.dispatch_workgroups(eye.image_width.div_ceil(GROUP), eye.image_height.div_ceil(GROUP), 1);
+            self.pass
+                .encode(&mut pass, &target.group, eye.image_width, eye.image_height);
         }
         let mut passes = &[Pass::Path][..];
         if let (Some(thinning), Some(lessons), Some(pipelines)) = (thinning, &mut target.lessons, &self.lesson_passes) {
@@ -215,17 +173,10 @@ impl<S: LightSampler> GpuFrames<S> {
     }
 
     fn upload_sampler(&mut self) -> Result<(), RenderError> {
-        let Some(packed) = self.drawn.direct.0.pack() else {
-            return Ok(());
-        };
-        let bytes: &[u8] = bytemuck::cast_slice(&packed.words);
-        if bytes.len() as u64 <= self.cache.size() {
-            self.gpu.queue.write_buffer(&self.cache, 0, bytes);
-        } else {
-            self.cache = storage(&self.gpu, "light sampler", bytes)?;
-            self.cache_group = group(&self.gpu, &self.pipeline, 2, &[(0, &self.cache)]);
+        match self.drawn.direct.0.pack() {
+            Some(packed) => self.pass.set_sampler(&self.gpu, &packed),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     /// Why nothing goes on.
@@ -233,87 +184,21 @@ impl<S: LightSampler> GpuFrames<S> {
         self.gpu.error().unwrap_or_else(|| self.gpu.gone())
     }
 
-    /// [`GpuFrames::read_film`], once after every frame.
+    /// What the device has accumulated, read once after every frame; `film` has the frames' number and weights.
     fn read_once(&self, film: &Film) -> &(Film, Counters) {
-        self.film.get_or_init(|| self.read_film(film))
-    }
-
-    /// What the device has accumulated; `film` has the frames' number and weights.
-    fn read_film(&self, film: &Film) -> (Film, Counters) {
-        let mut read_back = film.clone();
-        let mut counters = Counters::default();
-        if let Some(target) = &self.target {
-            read(&self.gpu, &target.film, |bytes| {
-                let pixels: &[FilmPixel] = bytemuck::cast_slice(bytes);
-                if film.spp() > 0 {
-                    read_back.load(|pixel| (pixels[pixel].sums(), pixels[pixel].count, pixels[pixel].weight()));
-                }
-                for pixel in pixels {
-                    counters.rays_nearest += u64::from(pixel.rays_nearest);
-                    counters.rays_occluded += u64::from(pixel.rays_occluded);
-                    counters.nonfinite += u64::from(pixel.nonfinite);
-                }
-            });
-        }
-        (read_back, counters)
-    }
-}
-
-/// The bind group `index` of `pipeline`: buffers by their bindings.
-pub(super) fn group(
-    gpu: &Gpu,
-    pipeline: &wgpu::ComputePipeline,
-    index: u32,
-    buffers: &[(u32, &wgpu::Buffer)],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = buffers
-        .iter()
-        .map(|&(binding, buffer)| wgpu::BindGroupEntry {
-            binding,
-            resource: buffer.as_entire_binding(),
+        self.film.get_or_init(|| match &self.target {
+            Some(target) => target.read(&self.gpu, film),
+            None => (film.clone(), Counters::default()),
         })
-        .collect();
-    gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(index),
-        entries: &entries,
-    })
-}
-
-/// The path pass, specialised to scene, sampler and settings.
-fn compile<S: LightSampler>(
-    gpu: &Gpu,
-    sampler: &S,
-    packed: &Packed,
-    scene: &SceneBuffers,
-    settings: &Settings,
-) -> Result<wgpu::ComputePipeline, RenderError> {
-    let text = shader::pass("path", packed.scheme)?;
-    let resamples = matches!(settings.method, Method::Sampled(_)) && settings.candidates > 1;
-    let heuristic = settings.mis.heuristic().map_or(4, |heuristic| heuristic as u32);
-    let mut constants: Vec<(&str, f64)> = vec![
-        ("LEARNS", f64::from(u8::from(S::LEARNS))),
-        ("CONTROLLED", f64::from(u8::from(sampler.is_controlled()))),
-        ("RESAMPLES", f64::from(u8::from(resamples))),
-        ("HEURISTIC", f64::from(heuristic)),
-    ];
-    constants.extend(scene.switches.iter().map(|&(name, on)| (name, f64::from(u8::from(on)))));
-    gpu.compile("path", &text, &constants)
+    }
 }
 
 impl<S: LightSampler> Frames for GpuFrames<S> {
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
         self.drawn.direct.0.set_eye(eye.camera.origin_ws);
         self.controls = FrameParams::CONTROLS_NEW;
-        let pixels = u64::from(eye.image_width) * u64::from(eye.image_height);
-        if self.target.as_ref().is_some_and(|target| target.pixels == pixels) {
-            return;
-        }
-        self.counted = Frames::counters(self, film);
-        self.film = OnceCell::new();
-        match self.target(eye, pixels) {
-            Ok(target) => self.target = Some(target),
-            Err(error) => self.failure = Some(error),
+        if let Err(error) = self.make_room(eye, film) {
+            self.failure = Some(error);
         }
     }
 
@@ -344,11 +229,11 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
 
     fn scene_changed(&mut self, scene: &Scene) {
         self.drawn.scene_changed(scene);
-        let uploaded = SceneBuffers::new(&self.gpu, scene).and_then(|buffers| {
-            self.scene_group = group(&self.gpu, &self.pipeline, 1, &buffers.bindings());
-            self.upload_sampler()
-        });
-        if let Err(error) = uploaded {
+        let uploaded = self.pass.set_scene(&self.gpu, scene);
+        if let Some(target) = &mut self.target {
+            target.bind(&self.gpu, &self.pass);
+        }
+        if let Err(error) = uploaded.and_then(|()| self.upload_sampler()) {
             self.failure = Some(error);
         }
     }

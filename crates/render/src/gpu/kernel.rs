@@ -2,7 +2,7 @@
 
 use super::buffers::{read, storage, uniform, written};
 use super::device::Gpu;
-use super::frames::group;
+use super::path_pass::group;
 use super::shader::link;
 use crate::RenderError;
 use light_cache::Packed;
@@ -30,7 +30,7 @@ impl Kernel<'_> {
             .map_or(light_cache::Scheme::Uniform, |packed| packed.scheme);
         let module = gpu.device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some("kernel"),
-            source: wgpu::ShaderSource::Wgsl(link(self.text, scheme)?.into()),
+            source: wgpu::ShaderSource::Wgsl(link(self.text, scheme, false)?.into()),
         });
         let pipeline = gpu.device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some("kernel"),

@@ -1,6 +1,7 @@
 //! Records that frames share with `shaders/record`.
 
 pub use crate::control::PixelControl;
+use crate::film::AovRecord;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use light_cache::{Observation, ShadingPoint};
@@ -61,6 +62,35 @@ impl FilmPixel {
     /// Sum of the weights.
     pub(crate) fn weight(&self) -> f64 {
         f64::from(self.weight_hi) + f64::from(self.weight_lo)
+    }
+}
+
+/// Auxiliary sums of one pixel: `AovPixel` in `shaders/record/aov.wgsl`.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+#[allow(missing_docs, reason = "told in the shader")]
+pub struct AovPixel {
+    pub hi: [f32; 12],
+    pub lo: [f32; 12],
+    pub depth_hi: f32,
+    pub depth_lo: f32,
+    pub hits: u32,
+    pub light: u32,
+}
+
+impl AovPixel {
+    /// The same as the CPU keeps it, of `count` samples.
+    pub(crate) fn get(&self, count: u32) -> AovRecord {
+        let mut sums = [f64::from(self.depth_hi) + f64::from(self.depth_lo); 13];
+        for (sum, (hi, lo)) in sums.iter_mut().zip(self.hi.iter().zip(&self.lo)) {
+            *sum = f64::from(*hi) + f64::from(*lo);
+        }
+        AovRecord {
+            sums,
+            count,
+            hits: self.hits,
+            light: if self.light == u32::MAX { -1 } else { self.light.into() },
+        }
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::buffers::{read, read_start, uniform, written};
 use super::device::Gpu;
-use super::frames::group;
 use super::layout::{LessonCounters, LessonParams, PackedObservation, Run};
+use super::path_pass::group;
 use super::shader;
 use super::timing::{Pass, Timer};
 use crate::RenderError;
@@ -25,7 +25,7 @@ pub(super) struct LessonPasses {
 impl LessonPasses {
     pub(super) fn new(gpu: &Gpu) -> Result<Self, RenderError> {
         // Whatever the sampler: these passes draw no lights.
-        let pipeline = |pass: Pass| gpu.compile(pass.name(), &shader::pass(pass.name(), Scheme::Uniform)?, &[]);
+        let pipeline = |pass: Pass| gpu.compile(pass.name(), &shader::pass(pass.name(), Scheme::Uniform, false)?, &[]);
         Ok(Self {
             tally: pipeline(Pass::Tally)?,
             thin: pipeline(Pass::Thin)?,
@@ -149,6 +149,20 @@ impl Lessons {
         }
     }
 
+    /// What was kept of the epoch so far; less of a device that is lost.
+    pub(super) fn into_kept(mut self, gpu: &Gpu) -> Vec<Vec<Observation>> {
+        if self.waiting > 0 {
+            let waiting = self.collect(gpu);
+            self.collected.extend(waiting.unwrap_or_default());
+        }
+        self.collected
+    }
+
+    /// Adds what was kept of the epoch so far, in frames of another size.
+    pub(super) fn go_on_with(&mut self, kept: Vec<Vec<Observation>>) {
+        self.collected = kept;
+    }
+
     fn most_kept(&self, thinning: &Thinning) -> usize {
         thinning.most_kept().min(self.per_frame)
     }
@@ -182,9 +196,10 @@ pub(super) fn read_all(
     observations: &wgpu::Buffer,
     [width, height, slots]: [u32; 3],
 ) -> Option<Vec<Vec<Observation>>> {
-    read(gpu, observations, |bytes| {
+    let slots = slots as usize;
+    let count = width as usize * height as usize * slots;
+    read_start(gpu, observations, count * size_of::<PackedObservation>(), |bytes| {
         let all: &[PackedObservation] = bytemuck::cast_slice(bytes);
-        let slots = slots as usize;
         let starts = |end: u32| (0..end).step_by(TILE_SIZE as usize);
         let tile = |x0: u32, y0: u32| {
             let rows = y0..(y0 + TILE_SIZE).min(height);

@@ -6,7 +6,8 @@
 //! device until somebody looks at it. Samplers learn on the CPU, from observations that the device has written down and thinned; they are
 //! read when an epoch is over, and what was learned is uploaded.
 //!
-//! Needs WebGPU's default limits and no feature; larger limits are used where the adapter has them.
+//! Needs WebGPU's default limits and no feature; larger limits are used where the adapter has them. Auxiliary images alone need one storage
+//! buffer more than the default.
 
 mod buffers;
 mod device;
@@ -14,14 +15,18 @@ mod frames;
 mod kernel;
 mod layout;
 mod lessons;
+mod path_pass;
 mod pipelines;
 mod scene;
 mod shader;
+mod target;
 mod timing;
 
 pub use device::{AdapterInfo, Gpu, adapters};
 pub use kernel::Kernel;
-pub use layout::{FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run};
+pub use layout::{
+    AovPixel, FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run,
+};
 pub use shader::{files, link};
 pub use timing::PassTime;
 
@@ -84,9 +89,6 @@ pub fn check(settings: &Settings) -> Result<SamplerKind, RenderError> {
     }
     if settings.pixel_filter != PixelFilter::Box {
         return Err(refusal("a pixel filter other than 'box'".into()));
-    }
-    if settings.aovs {
-        return Err(refusal("auxiliary images".into()));
     }
     if settings.adaptive_pixels {
         return Err(refusal(

@@ -21,6 +21,7 @@ const FILES: &[(&str, &str)] = files![
     "lib/interval.wgsl",
     "lib/mis.wgsl",
     "lib/sequence.wgsl",
+    "lib/sum.wgsl",
     "lib/tile.wgsl",
     "lib/triangle.wgsl",
     "lib/wide.wgsl",
@@ -36,6 +37,9 @@ const FILES: &[(&str, &str)] = files![
     "pass/path.wgsl",
     "pass/tally.wgsl",
     "pass/thin.wgsl",
+    "probe/first_hit.wgsl",
+    "probe/none.wgsl",
+    "record/aov.wgsl",
     "record/film.wgsl",
     "record/frame.wgsl",
     "record/lesson.wgsl",
@@ -51,6 +55,9 @@ const FILES: &[(&str, &str)] = files![
 /// The name that every sampler goes by: it is bound to the file of the one in use.
 const SAMPLER: &str = "light_cache/sampler.wgsl";
 
+/// Likewise, of what looks over the path's shoulder.
+const PROBE: &str = "probe/probe.wgsl";
+
 /// The files of the back end: path under `shaders/`, and text.
 pub fn files() -> &'static [(&'static str, &'static str)] {
     FILES
@@ -65,39 +72,54 @@ fn sampler_file(scheme: Scheme) -> &'static str {
     }
 }
 
-/// `text` with everything that it imports, each file once, before what needs it; lights are drawn by `scheme`.
+fn probe_file(aovs: bool) -> &'static str {
+    if aovs {
+        "probe/first_hit.wgsl"
+    } else {
+        "probe/none.wgsl"
+    }
+}
+
+/// `text` with everything that it imports, each file once, before what needs it; lights are drawn by `scheme`, and with `aovs` paths tell
+/// what they meet first.
 ///
 /// # Errors
 /// [`RenderError::Gpu`] for an import that there is no file for.
-pub fn link(text: &str, scheme: Scheme) -> Result<String, RenderError> {
+pub fn link(text: &str, scheme: Scheme, aovs: bool) -> Result<String, RenderError> {
     let mut linked = String::new();
     let mut done = Vec::new();
-    add(text, scheme, &mut done, &mut linked)?;
+    let bound = [(SAMPLER, sampler_file(scheme)), (PROBE, probe_file(aovs))];
+    add(text, &bound, &mut done, &mut linked)?;
     Ok(linked)
 }
 
 /// The pass of that name, linked.
-pub(crate) fn pass(name: &str, scheme: Scheme) -> Result<String, RenderError> {
-    link(&format!("#import \"pass/{name}.wgsl\"\n"), scheme)
+pub(crate) fn pass(name: &str, scheme: Scheme, aovs: bool) -> Result<String, RenderError> {
+    link(&format!("#import \"pass/{name}.wgsl\"\n"), scheme, aovs)
 }
 
-fn add(text: &str, scheme: Scheme, done: &mut Vec<&'static str>, linked: &mut String) -> Result<(), RenderError> {
+/// Appends `text` to `linked`; `bound`: files by the names that stand for them.
+fn add(
+    text: &str,
+    bound: &[(&str, &'static str)],
+    done: &mut Vec<&'static str>,
+    linked: &mut String,
+) -> Result<(), RenderError> {
     for line in text.lines() {
         let Some(import) = line.strip_prefix("#import ") else {
             linked.push_str(line);
             linked.push('\n');
             continue;
         };
-        let wanted = match import.trim().trim_matches('"') {
-            SAMPLER => sampler_file(scheme),
-            path => path,
-        };
+        let import = import.trim().trim_matches('"');
+        let stands_for = bound.iter().find(|(name, _)| *name == import);
+        let wanted = stands_for.map_or(import, |(_, path)| path);
         let Some((path, text)) = FILES.iter().find(|(path, _)| *path == wanted) else {
             return Err(GpuFault::NoAdapter.error(format!("no shader file {wanted}")));
         };
         if !done.contains(path) {
             done.push(path);
-            add(text, scheme, done, linked)?;
+            add(text, bound, done, linked)?;
         }
     }
     Ok(())
@@ -109,8 +131,9 @@ mod tests {
 
     #[test]
     fn every_pass_links_and_is_valid_with_every_sampler() {
-        for scheme in [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive] {
-            let text = pass("path", scheme).expect("links");
+        let schemes = [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive];
+        for (scheme, aovs) in schemes.into_iter().flat_map(|scheme| [(scheme, false), (scheme, true)]) {
+            let text = pass("path", scheme, aovs).expect("links");
             let module = match wgpu::naga::front::wgsl::parse_str(&text) {
                 Ok(module) => module,
                 Err(error) => panic!("{scheme:?}: {}", error.emit_to_string(&text)),
@@ -130,9 +153,10 @@ mod tests {
         let text = link(
             "#import \"lib/hash.wgsl\"\n#import \"lib/interval.wgsl\"\n",
             Scheme::Uniform,
+            false,
         )
         .expect("links");
         assert_eq!(text.matches("fn mix_bits(").count(), 1);
-        assert!(link("#import \"lib/none.wgsl\"\n", Scheme::Uniform).is_err());
+        assert!(link("#import \"lib/none.wgsl\"\n", Scheme::Uniform, false).is_err());
     }
 }

@@ -1,6 +1,7 @@
 //! The window's state, and its frame from top to bottom.
 
 mod act;
+mod opening;
 
 use super::ViewArgs;
 use super::camera_control::FlyCamera;
@@ -15,7 +16,7 @@ use super::script::Script;
 use super::settings_file::Remembered;
 use super::views::View;
 use crate::cli::Backend;
-use crate::exit::{Refusal, Status};
+use crate::exit::Status;
 use crate::{message, session};
 use anyhow::Result;
 use glam::Vec3;
@@ -26,7 +27,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
-use winit::window::{Window, WindowAttributes};
+use winit::window::Window;
 
 /// Seconds in which automatic exposure comes about two thirds of the way.
 const ADAPTATION_S: f32 = 0.25;
@@ -68,6 +69,8 @@ pub(super) struct Exposure {
 pub(super) struct App {
     pub(super) window: Option<Arc<Window>>,
     pub(super) display: Option<Display>,
+    /// The device that draws was lost, and another took its place.
+    replaced: bool,
     pub(super) egui: egui::Context,
     pub(super) egui_input: Option<egui_winit::State>,
     proxy: EventLoopProxy<Event>,
@@ -146,6 +149,7 @@ impl App {
         let mut app = Self {
             window: None,
             display: None,
+            replaced: false,
             egui,
             egui_input: None,
             proxy,
@@ -202,32 +206,6 @@ impl App {
     pub(super) fn outcome(mut self) -> Result<Status> {
         self.remember();
         self.outcome
-    }
-
-    /// Opens the window.
-    pub(super) fn open_window(&mut self, event_loop: &ActiveEventLoop) -> Result<()> {
-        let (width, height) = self.window_size;
-        let attributes = WindowAttributes::default()
-            .with_title("manylight")
-            .with_inner_size(winit::dpi::PhysicalSize::new(width, height));
-        let window = event_loop
-            .create_window(attributes)
-            .map_err(|error| Refusal::NoGpu(format!("the system gives no window ({error})")))?;
-        let window = Arc::new(window);
-        let display = Display::new(event_loop, window.clone())?;
-        self.egui_input = Some(egui_winit::State::new(
-            self.egui.clone(),
-            egui::ViewportId::ROOT,
-            &window,
-            Some(window.scale_factor() as f32),
-            None,
-            Some(display.max_texture_side()),
-        ));
-        let size = window.inner_size();
-        self.display = Some(display);
-        self.window = Some(window);
-        self.resize(size.width, size.height);
-        Ok(())
     }
 
     /// Ends with an error.
@@ -396,10 +374,10 @@ impl App {
 
     /// Decides when the next frame comes.
     fn go_on(&mut self, event_loop: &ActiveEventLoop) {
-        if self.display.as_ref().is_some_and(Display::is_lost) {
-            let text = "the graphics device was lost or is out of memory; start again, or use `manylight render`, which \
-                        needs none";
-            return self.fail(event_loop, Refusal::OutOfMemory(text.into()).into());
+        if self.display.as_ref().is_some_and(Display::is_lost)
+            && let Err(error) = self.replace_display(event_loop)
+        {
+            return self.fail(event_loop, error);
         }
         let busy = self.fly.is_flying() || self.driver.is_busy() || self.is_adapting();
         self.idle = !busy;

@@ -29,6 +29,8 @@ pub(super) struct Display {
     lost: Arc<AtomicBool>,
     picture: PicturePass,
     panels: egui_wgpu::Renderer,
+    /// Drawn so far.
+    frames: u64,
 }
 
 /// The panels of a frame, ready to be drawn.
@@ -121,6 +123,7 @@ impl Display {
             device,
             queue,
             lost,
+            frames: 0,
         })
     }
 
@@ -137,6 +140,11 @@ impl Display {
     /// Whether the device is lost or out of memory: nothing can be drawn any more.
     pub(super) fn is_lost(&self) -> bool {
         self.lost.load(Ordering::Relaxed)
+    }
+
+    /// Frames that it has drawn.
+    pub(super) fn frames(&self) -> u64 {
+        self.frames
     }
 
     /// Gives up the device, as a driver that fails does: for tests.
@@ -205,6 +213,7 @@ impl Display {
         for id in &panels.textures.free {
             self.panels.free_texture(id);
         }
+        self.frames += 1;
         copy.and_then(|copy| self.read(&copy))
     }
 

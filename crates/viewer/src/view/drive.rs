@@ -3,8 +3,8 @@
 use super::actions::{Action, KEY_NAMES, Part, With, action_of};
 use super::app::App;
 use super::frame_times::Summary;
-use super::renderer::Stages;
-use super::script::{Script, Step};
+use super::renderer::{Command, Stages};
+use super::script::{Script, Step, Which};
 use super::views::View;
 use crate::output;
 use glam::{Vec2, Vec3};
@@ -48,6 +48,8 @@ struct Report {
     /// Stops.
     exposure: f32,
     spp: u64,
+    /// What rendered the newest picture: "cpu" or "gpu".
+    rendered_on: &'static str,
     window_frame_ms: Option<Summary>,
     render_frame_ms: Option<Summary>,
     input_to_picture_ms: Option<Summary>,
@@ -155,11 +157,8 @@ impl App {
             Step::Open(what) => self.act(event_loop, Action::Open(what.clone())),
             Step::Settle(spp) => {
                 let figures = self.figures;
-                return (figures.still
-                    && figures.spp >= *spp
-                    && self.size == figures.size
-                    && figures.view == self.view)
-                    || self.panels.error.is_some();
+                let settled = figures.still && figures.spp >= *spp && self.size == figures.size;
+                return (settled && self.renderer.is_newest(&figures)) || self.panels.error.is_some();
             }
             Step::Random { count, seed } => {
                 let first = self.driver.random_done;
@@ -174,10 +173,14 @@ impl App {
                     self.fail(event_loop, error);
                 }
             }
-            Step::LoseDevice => {
+            Step::Render(backend) => self.act(event_loop, Action::Device(*backend)),
+            Step::LoseDevice(Which::Window) => {
                 if let Some(display) = &self.display {
                     display.lose();
                 }
+            }
+            Step::LoseDevice(Which::Renderer) => {
+                self.renderer.send(Command::LoseDevice);
             }
             Step::Quit => {
                 // What was asked for is written first.
@@ -278,6 +281,7 @@ impl App {
                 .unwrap_or_default(),
             exposure: self.exposure.now,
             spp: self.figures.spp,
+            rendered_on: if self.figures.on_gpu { "gpu" } else { "cpu" },
             window_frame_ms: self.times.window.summary(),
             render_frame_ms: self.times.render.summary(),
             input_to_picture_ms: self.times.latency.summary(),

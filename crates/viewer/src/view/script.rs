@@ -3,7 +3,9 @@
 
 use super::actions::{KEY_NAMES, With};
 use super::views::View;
+use crate::cli::Backend;
 use anyhow::{Context, Result, bail};
+use clap::ValueEnum;
 use glam::{Vec2, Vec3};
 use render::Method;
 use std::collections::VecDeque;
@@ -26,7 +28,8 @@ FRAME settle SPP                  wait until the picture rests and has SPP sampl
 FRAME random N SEED               N random inputs
 FRAME screenshot FILE             .png as seen, .exr linear
 FRAME report FILE                 frame times and input latency as JSON
-FRAME lose-device                 as if the graphics driver failed
+FRAME backend NAME                cpu, gpu
+FRAME lose-device WHICH           as if the driver failed: window (what shows), renderer (what --backend gpu renders on)
 FRAME quit";
 
 /// Something due.
@@ -45,8 +48,18 @@ pub(super) enum Step {
     Random { count: u32, seed: u32 },
     Screenshot(PathBuf),
     Report(PathBuf),
-    LoseDevice,
+    Render(Backend),
+    LoseDevice(Which),
     Quit,
+}
+
+/// One of the two devices that may be there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Which {
+    /// The window is drawn with it.
+    Window,
+    /// The GPU back end renders on it.
+    Renderer,
 }
 
 /// A script, and how far it has come.
@@ -156,7 +169,12 @@ fn parse_step(words: &[&str]) -> Result<Step> {
         },
         ["screenshot", file] => Step::Screenshot(file.into()),
         ["report", file] => Step::Report(file.into()),
-        ["lose-device"] => Step::LoseDevice,
+        ["backend", name] => Step::Render(match Backend::from_str(name, false) {
+            Ok(backend) => backend,
+            Err(_) => bail!("no back end '{name}'; there is: cpu, gpu"),
+        }),
+        ["lose-device", "window"] => Step::LoseDevice(Which::Window),
+        ["lose-device", "renderer"] => Step::LoseDevice(Which::Renderer),
         ["quit"] => Step::Quit,
         _ => bail!("not understood; the lines are:\n{SYNTAX}"),
     })
@@ -231,8 +249,13 @@ mod tests {
                 .replace("SCENE", "demo:rooms")
                 .replace("SPP", "4")
                 .replace("N SEED", "10 3")
-                .replace("FILE", "out.png");
-            let name = if usage.contains("sampler") { "tree" } else { "depth" };
+                .replace("FILE", "out.png")
+                .replace("WHICH", "renderer");
+            let name = match usage {
+                usage if usage.contains("sampler") => "tree",
+                usage if usage.contains("backend") => "gpu",
+                _ => "depth",
+            };
             let example = example.replace("NAME", name);
             Script::parse(&example).unwrap_or_else(|error| panic!("{example}: {error:#}"));
         }
@@ -249,6 +272,8 @@ mod tests {
             ("0 camera 0 0 0 0 5 0", "straight up"),
             ("0 look nan 1", "finite"),
             ("0 sampler best", "adaptive"),
+            ("0 backend tpu", "cpu, gpu"),
+            ("0 lose-device", "WHICH"),
         ] {
             let error = format!("{:#}", Script::parse(text).expect_err(text));
             assert!(error.contains(expected), "{text}: {error}");

@@ -5,15 +5,16 @@ use super::super::views::light_color;
 use super::theme;
 use crate::clean::Projection;
 use crate::table;
-use egui::{Align2, Area, Color32, Id, LayerId, Order, Painter, Pos2, Stroke, vec2};
+use egui::{Align2, Area, Color32, Id, LayerId, Order, Painter, Pos2, Rect, Stroke, vec2};
 use glam::Vec3;
 
 /// Height of a window in which figures and card find room above each other, points.
 const ROOM_FOR_BOTH: f32 = 660.0;
 
-/// Lines from the point to its lights, and a ring around the lamp that is marked.
-pub(super) fn markers(context: &egui::Context, app: &App) {
+/// Lines from the point to its lights, and a ring around the lamp that is marked, where the picture is seen: in `free`.
+pub(super) fn markers(context: &egui::Context, app: &App, free: Rect) {
     let painter = context.layer_painter(LayerId::new(Order::Background, Id::unique("markers")));
+    let painter = painter.with_clip_rect(free);
     if let Some(found) = &app.inspection
         && let Some(point) = on_screen(context, app, found.position_ws)
     {

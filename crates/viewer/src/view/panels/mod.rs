@@ -49,12 +49,12 @@ impl Default for PanelState {
 /// Lays everything out; what the user asks for goes to `actions`.
 pub(super) fn show(ui: &mut egui::Ui, app: &mut App, actions: &mut Vec<Action>) {
     let context = ui.ctx().clone();
-    inspected::markers(&context, app);
+    let side_open = !app.panels.hidden && (app.panels.settings || app.panels.lights);
+    if side_open {
+        side(ui, app, actions);
+    }
+    inspected::markers(&context, app, ui.available_rect_before_wrap());
     if !app.panels.hidden {
-        let side_open = app.panels.settings || app.panels.lights;
-        if side_open {
-            side(ui, app, actions);
-        }
         // In a narrow window what was opened last is what matters.
         if !side_open || context.content_rect().width() >= theme::ROOM_FOR_SIDE {
             if app.panels.overlay {

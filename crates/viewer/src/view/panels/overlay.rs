@@ -35,7 +35,7 @@ fn figures(ui: &mut egui::Ui, app: &App) {
         (_, true) => "refining",
         (_, false) => "moving",
     };
-    let noise = if app.denoise && app.view == View::Image && !figures.on_gpu {
+    let noise = if app.denoise && app.view == View::Image {
         ", denoised"
     } else {
         ""
@@ -53,6 +53,9 @@ fn figures(ui: &mut egui::Ui, app: &App) {
         curve(ui, &app.times.render, app.budget_ms);
         let stages = figures.stages;
         row(ui, "trace, learn", milliseconds(&[stages.trace_ms, stages.learn_ms]));
+        if figures.on_gpu {
+            row(ui, "read back", milliseconds(&[stages.read_ms]));
+        }
         row(
             ui,
             "history, denoise, upload",

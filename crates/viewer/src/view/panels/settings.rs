@@ -34,9 +34,6 @@ pub(super) fn show(ui: &mut egui::Ui, app: &mut App, actions: &mut Vec<Action>) 
             }
         }
     });
-    if app.backend == Backend::Gpu {
-        ui.label(theme::faint("raw samples: no noise is taken away here"));
-    }
 
     theme::heading(ui, "Picture");
     let mut budget_ms = app.budget_ms;

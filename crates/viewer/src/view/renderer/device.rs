@@ -7,6 +7,12 @@ use anyhow::Result;
 use render::{FrameLoop, Settings};
 use scene::{Camera, Scene};
 use std::sync::Arc;
+use std::time::Duration;
+
+/// Told before shaders are compiled.
+pub(super) const COMPILING: &str = "the GPU's shaders are compiled; at first this may take a while";
+/// A device that is taken away goes after so long: in the middle of a frame.
+const LOST_AFTER: Duration = Duration::from_millis(30);
 
 /// What renders.
 pub(super) struct Device {
@@ -26,7 +32,7 @@ impl Device {
         }
     }
 
-    /// Whether the GPU renders what is shown now: then there are no auxiliary images.
+    /// Whether the GPU renders what is shown now.
     pub(super) fn renders(&self) -> bool {
         self.renders
     }
@@ -44,18 +50,12 @@ impl Device {
     ) -> Result<Box<dyn FrameLoop<'static>>> {
         self.renders = false;
         if self.wanted == Backend::Gpu {
-            let on_device = Settings {
-                aovs: false,
-                ..settings.clone()
-            };
             // This alone is rendered elsewhere: with other settings the device can go on.
-            if let Err(error) = render::gpu::check(&on_device) {
+            if let Err(error) = render::gpu::check(settings) {
                 tell(Report::Trouble(format!("{error}: this is rendered on the CPU")));
             } else {
-                tell(Report::Trouble(
-                    "the GPU's shaders are compiled; at first this may take a while".into(),
-                ));
-                match self.start_on_device(scene, camera, &on_device) {
+                tell(Report::Trouble(COMPILING.into()));
+                match self.start_on_device(scene, camera, settings) {
                     Ok(frames) => {
                         self.renders = true;
                         return Ok(frames);
@@ -78,6 +78,17 @@ impl Device {
             None => self.open.insert(BackEnd::open(self.wanted)?).clone(),
         };
         back_end.start(scene.clone(), camera, settings)
+    }
+
+    /// Takes the device away in a moment, whatever it does then, as a driver that fails: for tests.
+    pub(super) fn lose(&self) {
+        if let Some(BackEnd::Gpu(gpu)) = &self.open {
+            let gpu = gpu.clone();
+            std::thread::spawn(move || {
+                std::thread::sleep(LOST_AFTER);
+                gpu.destroy();
+            });
+        }
     }
 
     /// The device does not work: the processor goes on, until somebody chooses the device again.

@@ -21,6 +21,8 @@ pub(in crate::view) enum Command {
     Resize(u32, u32),
     /// Something else renders.
     Device(Backend),
+    /// The device that renders is taken away, for tests.
+    LoseDevice,
     /// Another way of rendering; size and auxiliary images are not looked at.
     Render(Box<Settings>),
     /// Another view.
@@ -42,9 +44,25 @@ pub(in crate::view) enum Command {
 }
 
 impl Command {
+    /// Whether the picture is another one, or made anew, when it is obeyed.
+    pub(super) fn asks_for_picture(&self) -> bool {
+        !matches!(
+            self,
+            Self::Budget(_)
+                | Self::Importance(_)
+                | Self::Pause(_)
+                | Self::Inspect(_)
+                | Self::SaveExr(_)
+                | Self::LoseDevice
+        )
+    }
+
     /// Whether it is not to wait until a frame in full size has ended.
     pub(super) fn is_urgent(&self) -> bool {
-        !matches!(self, Self::Budget(_) | Self::Importance(_) | Self::SaveExr(_))
+        !matches!(
+            self,
+            Self::Budget(_) | Self::Importance(_) | Self::SaveExr(_) | Self::LoseDevice
+        )
     }
 }
 
@@ -83,7 +101,6 @@ pub(in crate::view) struct Figures {
     pub(in crate::view) spp: u64,
     /// The camera rests: the picture has its full size.
     pub(in crate::view) still: bool,
-    pub(in crate::view) view: View,
     /// Rendered on the GPU.
     pub(in crate::view) on_gpu: bool,
     /// Size in which it was rendered.
@@ -95,6 +112,8 @@ pub(in crate::view) struct Figures {
     pub(in crate::view) cells: usize,
     /// Bytes of what the sampler keeps.
     pub(in crate::view) sampler_bytes: usize,
+    /// Commands that it obeys, of those that ask for another picture.
+    pub(in crate::view) commands: u64,
     /// The first input that it is the first to show.
     pub(in crate::view) input: Option<Instant>,
 }
@@ -106,6 +125,8 @@ pub(in crate::view) struct Stages {
     pub(in crate::view) trace_ms: f64,
     /// Learning which lights matter.
     pub(in crate::view) learn_ms: f64,
+    /// Reading back what a device has accumulated.
+    pub(in crate::view) read_ms: f64,
     /// Taking over what earlier pictures knew.
     pub(in crate::view) history_ms: f64,
     /// Taking away the noise that is left.
