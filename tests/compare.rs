@@ -14,6 +14,8 @@ pub struct Plan {
     pub settings: Settings,
     /// Samples per pixel and repetition. Learning samplers start anew in each.
     pub spp: u32,
+    /// Cameras of frames that are rendered before, one each, and thrown away: what is kept of them counts.
+    pub before: Vec<Camera>,
     /// Number of renderings with seeds of their own.
     pub repetitions: u64,
 }
@@ -29,6 +31,7 @@ impl Plan {
                 ..Settings::default()
             },
             spp: 16,
+            before: Vec::new(),
             repetitions: 16,
         }
     }
@@ -42,6 +45,12 @@ impl Plan {
     /// With other numbers of samples and repetitions.
     pub fn effort(mut self, spp: u32, repetitions: u64) -> Self {
         (self.spp, self.repetitions) = (spp, repetitions);
+        self
+    }
+
+    /// After frames of their own, seen by these cameras.
+    pub fn after(mut self, before: Vec<Camera>) -> Self {
+        self.before = before;
         self
     }
 
@@ -89,7 +98,19 @@ pub fn sampled(kind: SamplerKind) -> Method {
 
 /// One rendering.
 pub fn image(scene: &Scene, camera: &Camera, settings: &Settings, spp: u32) -> Image {
+    image_after(scene, &[], camera, settings, spp)
+}
+
+/// One rendering after frames seen by other cameras.
+fn image_after(scene: &Scene, before: &[Camera], camera: &Camera, settings: &Settings, spp: u32) -> Image {
     let mut rendering = renderer(scene, camera, settings).expect("the settings are valid");
+    for camera in before {
+        rendering.set_camera(camera);
+        rendering.render_frame();
+    }
+    if !before.is_empty() {
+        rendering.set_camera(camera);
+    }
     for _ in 0..spp {
         rendering.render_frame();
     }
@@ -134,7 +155,7 @@ impl<'s> Case<'s> {
                 seed: plan.settings.seed + repetition,
                 ..plan.settings.clone()
             };
-            let image = image(self.scene, self.camera, &settings, plan.spp);
+            let image = image_after(self.scene, &plan.before, self.camera, &settings, plan.spp);
             let mut sum = 0.0;
             for (moments, &pixel) in estimate.pixels.iter_mut().zip(&image.pixels) {
                 let value = f64::from(luminance(Vec3::from_array(pixel)));

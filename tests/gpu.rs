@@ -298,8 +298,9 @@ fn what_the_gpu_lacks_is_refused_with_the_remedy() {
     let Some(gpu) = gpu() else { return };
     let scene = scene::load("demo:one-light").expect("it is generated");
     type Change = fn(&mut Settings);
-    let cases: [(Change, &str); 4] = [
+    let cases: [(Change, &str); 5] = [
         (|s| s.method = Method::Exact, "exact"),
+        (|s| s.method = Method::Restir, "restir"),
         (|s| s.pixel_sampler = sampling::PixelSampler::Halton, "halton"),
         (|s| s.pixel_filter = render::PixelFilter::Gaussian, "filter"),
         (|s| s.adaptive_pixels = true, "--target-error"),

@@ -18,6 +18,8 @@ mod layout;
 mod placed;
 /// What must hold for any scene: invariances, degenerate inputs, threads, probabilities.
 mod properties;
+/// Light samples that are kept from frame to frame.
+mod restir;
 /// A million lights.
 mod scale;
 /// Functions that Rust and the shaders share.

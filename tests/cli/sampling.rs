@@ -112,6 +112,26 @@ fn names_and_folders_that_cannot_be_are_refused() {
 }
 
 #[test]
+fn what_needs_independent_frames_is_refused_to_restir() {
+    let temporary = folder();
+    let folder = temporary.path();
+    let restir = |more| render("demo:rooms:16", &["--sampler=restir", more]);
+    refused(folder, &restir("--target-error=0.01"), &["restir", "--target-error"]);
+    refused(folder, &restir("--shard=1/2"), &["restir", "--shard"]);
+    refused(folder, &restir("--resume=state"), &["restir", "--resume"]);
+    refused(folder, &restir("--aov=variance"), &["restir", "variance"]);
+    refused(
+        folder,
+        &restir("--restir-candidates=0"),
+        &["restir.candidates", "1 to 1,024"],
+    );
+    let part = ["render", "demo:rooms:16", "--sampler=restir", "-o", "a.part"];
+    refused(folder, &part, &["restir", ".part"]);
+    let dump = ["dump", "demo:rooms:16", "--sampler=restir", "-o", "a.csv"];
+    refused(folder, &dump, &["restir", "adaptive"]);
+}
+
+#[test]
 fn rendering_stops_when_the_image_is_good_enough() {
     let temporary = folder();
     let folder = temporary.path();

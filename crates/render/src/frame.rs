@@ -6,9 +6,10 @@ use crate::direct::OneLight;
 use crate::exact::AllLights;
 use crate::gpu::PassTime;
 use crate::oracle::Oracle;
+use crate::restir::Restir;
 use crate::{Film, Method, RenderError, Settings};
 pub(crate) use drawn::Drawn;
-use light_cache::{CellRecord, LightRecord, LightSampler, Recording, SamplerStats, ShadingPoint, Visitor};
+use light_cache::{CellRecord, LightRecord, LightSampler, Recording, SamplerKind, SamplerStats, ShadingPoint, Visitor};
 pub(crate) use rendering::{Eye, Frames, Rendering};
 use scene::{Camera, Scene};
 pub use state::film_of;
@@ -215,7 +216,16 @@ pub fn renderer<'s>(
             Box::new(Rendering::new(scene, camera, settings, frames, start))
         }
         Method::Oracle => Box::new(Rendering::new(scene, camera, settings, Oracle::new(settings), start)),
-        Method::Sampled(kind) => {
+        Method::Restir if scene.lights.len() > 1 => {
+            let restir = Restir::new(&scene, settings);
+            Box::new(Rendering::new(scene, camera, settings, restir, start))
+        }
+        Method::Sampled(_) | Method::Restir => {
+            // Of one light there is nothing to be kept: `restir` is then what its candidates are drawn by.
+            let kind = match settings.method {
+                Method::Sampled(kind) => kind,
+                _ => SamplerKind::Tree,
+            };
             let starter = Starter {
                 scene: scene.clone(),
                 camera,

@@ -22,6 +22,7 @@ mod oracle;
 mod path;
 pub mod rays;
 mod resampling;
+mod restir;
 pub mod settings;
 
 pub use choosing::Choosing;
@@ -30,4 +31,5 @@ pub use film::{ErrorEstimate, Film, Image, SampleCounts};
 pub use flip::flip;
 pub use frame::{FrameLoop, RenderStats, SceneRef, renderer};
 pub use metric::ImageError;
+pub use restir::RestirSettings;
 pub use settings::{MAX_CANDIDATES, MAX_LIGHT_SAMPLES, Method, Mis, PixelFilter, Settings};

@@ -212,12 +212,12 @@ pub(crate) struct Starts {
 
 /// Where a path begins.
 pub(crate) struct Start {
-    pixel: u32,
-    sample: u32,
-    direction_ws: Vec3,
-    hit: Option<Hit>,
+    pub(crate) pixel: u32,
+    pub(crate) sample: u32,
+    pub(crate) direction_ws: Vec3,
+    pub(crate) hit: Option<Hit>,
     /// As many as there are light samples.
-    light_numbers: [LightNumbers; MAX_LIGHT_SAMPLES as usize],
+    pub(crate) light_numbers: [LightNumbers; MAX_LIGHT_SAMPLES as usize],
 }
 
 impl Starts {
@@ -352,25 +352,8 @@ pub(crate) fn path<D: DirectLight>(
 
         // Direct light.
         let wo_ws = -ray.direction_ws;
-        let glossy = is_glossy(&surface.bsdf);
-        let shared = view.mis.filter(|_| view.area_lights);
-        let may_hit_light = shared.is_some() && glossy;
-        let continues =
-            (bounce < view.max_bounces || may_hit_light) && !is_black(&surface.bsdf) && !scene.lights.is_empty();
-        let point = ShadingPoint {
-            position_ws: surface.position_ws,
-            normal_ws: surface.bsdf.normal_ws,
-            primary: bounce == 0,
-        };
-        let local = view.direct.local(scene, &point);
-        let vertex = Vertex {
-            surface: &surface,
-            wo_ws,
-            throughput,
-            point,
-            shared: shared.filter(|_| continues),
-            candidates: if glossy { view.candidates } else { 1 },
-        };
+        let (vertex, continues) = Vertex::of_path(view, &surface, wo_ws, throughput, bounce);
+        let local = view.direct.local(scene, &vertex.point);
         let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
         brought.radiance += direct.radiance;
         brought.control += direct.control;
@@ -440,12 +423,43 @@ impl<L> Departure<L> {
     }
 }
 
+impl<'v> Vertex<'v> {
+    /// Number `bounce` of a path, and whether the path may go on from there.
+    #[inline(always)]
+    pub(crate) fn of_path<D>(
+        view: &FrameView<'_, D>,
+        surface: &'v Surface,
+        wo_ws: Vec3,
+        throughput: Vec3,
+        bounce: u32,
+    ) -> (Self, bool) {
+        let glossy = is_glossy(&surface.bsdf);
+        let shared = view.mis.filter(|_| view.area_lights);
+        let may_hit_light = shared.is_some() && glossy;
+        let continues =
+            (bounce < view.max_bounces || may_hit_light) && !is_black(&surface.bsdf) && !view.scene.lights.is_empty();
+        let vertex = Self {
+            surface,
+            wo_ws,
+            throughput,
+            point: ShadingPoint {
+                position_ws: surface.position_ws,
+                normal_ws: surface.bsdf.normal_ws,
+                primary: bounce == 0,
+            },
+            shared: shared.filter(|_| continues),
+            candidates: if glossy { view.candidates } else { 1 },
+        };
+        (vertex, continues)
+    }
+}
+
 /// Whether drawing from the BSDF is worth a ray of its own to find lights.
 fn is_glossy(bsdf: &Bsdf) -> bool {
     !bsdf.is_lambert() && bsdf.alpha < GLOSSY_ALPHA
 }
 
 /// Whether nothing is reflected, as by the glass of most lamps.
-fn is_black(bsdf: &Bsdf) -> bool {
+pub(crate) fn is_black(bsdf: &Bsdf) -> bool {
     bsdf.diffuse == Vec3::ZERO && bsdf.is_lambert()
 }

@@ -1,6 +1,6 @@
 //! Every knob of rendering, once.
 
-use crate::RenderError;
+use crate::{RenderError, RestirSettings};
 use light_cache::SamplerKind;
 use sampling::PixelSampler;
 use sampling::mis::Heuristic;
@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 pub enum Method {
     /// One light per path vertex, chosen by this sampler.
     Sampled(SamplerKind),
+    /// One light per path vertex; those of first hits are kept from frame to frame and shared by neighbours. Each frame has the right mean, but
+    /// frames depend on each other: a preview.
+    Restir,
     /// All lights at every path vertex: the judge. No cache, no choice.
     Exact,
     /// Research: one light per pixel, chosen with the best possible probabilities, which are worked out beforehand and not
@@ -24,6 +27,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Sampled(kind) => kind.name(),
+            Self::Restir => "restir",
             Self::Exact => "exact",
             Self::Oracle => "oracle",
         }
@@ -31,7 +35,10 @@ impl Method {
 
     /// All that render anything, whatever the other settings.
     pub fn all() -> impl Iterator<Item = Self> {
-        SamplerKind::ALL.into_iter().map(Self::Sampled).chain([Self::Exact])
+        SamplerKind::ALL
+            .into_iter()
+            .map(Self::Sampled)
+            .chain([Self::Restir, Self::Exact])
     }
 
     /// [`Method::all`], and those that serve research only.
@@ -45,7 +52,7 @@ impl Method {
             Self::Oracle => {
                 Some("research: knows the lights that each pixel sees, and finding out is not counted as time")
             }
-            Self::Sampled(_) | Self::Exact => None,
+            Self::Sampled(_) | Self::Restir | Self::Exact => None,
         }
     }
 }
@@ -132,7 +139,7 @@ pub struct Settings {
     /// light; lower values are faster.
     pub max_bounces: u32,
     /// Lights drawn at the first surface of every path, 1..=[`MAX_LIGHT_SAMPLES`]. Higher values spend more on light where
-    /// eye rays are dear; lower values make more frames. `exact` draws none.
+    /// eye rays are dear; lower values make more frames. `exact` draws none, `restir` always one.
     #[serde(default = "default_light_samples")]
     pub light_samples: u32,
     /// Lights compared for each one that is drawn at a glossy surface, 1..=[`MAX_CANDIDATES`]: one of them is kept in proportion to how it is
@@ -145,6 +152,9 @@ pub struct Settings {
     /// choice; lower values are prepared sooner. 16.
     #[serde(default = "default_oracle_passes")]
     pub oracle_passes: u32,
+    /// `restir`: what is kept and shared.
+    #[serde(default)]
+    pub restir: RestirSettings,
     /// Pixel filter.
     pub pixel_filter: PixelFilter,
     /// How samples are spread over the area of a pixel, the lights and the points on them, by the name of a [`PixelSampler`]. After the
@@ -178,6 +188,7 @@ impl Default for Settings {
             candidates: default_candidates(),
             seed: 0,
             oracle_passes: default_oracle_passes(),
+            restir: RestirSettings::default(),
             pixel_filter: PixelFilter::Box,
             pixel_sampler: PixelSampler::default(),
             mis: Mis::default(),
@@ -250,6 +261,12 @@ impl Settings {
                 "it takes one sample per pixel and frame: adaptive_pixels must be false",
             );
         }
+        if self.method == Method::Restir && self.adaptive_pixels {
+            return refuse(
+                "restir with adaptive_pixels (--target-error)".into(),
+                "its frames depend on each other, so that no error can be estimated from them: adaptive_pixels must be false",
+            );
+        }
         if !(1..=MAX_LIGHT_SAMPLES).contains(&self.light_samples) {
             return refuse(format!("light_samples = {}", self.light_samples), "must be 1 to 8");
         }
@@ -262,6 +279,7 @@ impl Settings {
                 "it must be 1 to 65,536; 16 is usual",
             );
         }
+        self.restir.check()?;
         let mass = self.light.min_probability_mass;
         if !share.contains(&mass) {
             return refuse(
@@ -308,13 +326,20 @@ mod tests {
     fn settings_out_of_range_are_refused_with_the_range() {
         Settings::default().check().expect("the default is valid");
         type Spoil = fn(&mut Settings);
-        let odd: [(&str, Spoil); 12] = [
+        let odd: [(&str, Spoil); 17] = [
             ("0 x 720", |s| s.width = 0),
             ("1280 x 40000", |s| s.height = 40_000),
             ("max_bounces = 2", |s| (s.method, s.max_bounces) = (Method::Oracle, 2)),
             ("adaptive_pixels", |s| {
                 (s.method, s.adaptive_pixels) = (Method::Oracle, true)
             }),
+            ("adaptive_pixels", |s| {
+                (s.method, s.adaptive_pixels) = (Method::Restir, true)
+            }),
+            ("restir.candidates", |s| s.restir.candidates = 0),
+            ("restir.neighbors", |s| s.restir.neighbors = 33),
+            ("restir.radius", |s| s.restir.radius = f32::NAN),
+            ("restir.history", |s| s.restir.history = 1001),
             ("light_samples", |s| s.light_samples = 9),
             ("candidates", |s| s.candidates = 0),
             ("oracle_passes", |s| s.oracle_passes = 0),

@@ -5,7 +5,7 @@ use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use light_cache::SamplerKind;
-use render::{Method, Mis, PixelFilter};
+use render::{Method, Mis, PixelFilter, RestirSettings};
 use sampling::PixelSampler;
 
 /// Renders scenes with very many lights, and learns which of them matter.
@@ -124,9 +124,47 @@ pub(crate) struct LightArgs {
     #[arg(long, value_name = "N", default_value_t = render::Settings::default().oracle_passes,
           value_parser = clap::value_parser!(u32).range(1..=65_536))]
     pub(crate) oracle_passes: u32,
+    #[command(flatten)]
+    pub(crate) restir: RestirArgs,
     /// BIASED: ignore lights whose learned importance is below this share of the mean; 0 = off
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, default_value_t = 0.0, value_parser = not_negative)]
     pub(crate) ignore_below: f32,
+}
+
+/// What `restir` keeps and shares.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct RestirArgs {
+    /// `restir`: lights compared in each pixel and frame
+    ///
+    /// Higher values begin with better lights; lower values make more frames.
+    #[arg(long, value_name = "N", default_value_t = RestirSettings::default().candidates)]
+    pub(crate) restir_candidates: u32,
+    /// `restir`: pixels nearby that each pixel takes a sample from
+    ///
+    /// Higher values have less noise in each frame; lower values are faster (two shadow rays each).
+    #[arg(long, value_name = "N", default_value_t = RestirSettings::default().neighbors)]
+    pub(crate) restir_neighbors: u32,
+    /// `restir`: how far away those are at most, in pixels
+    ///
+    /// Higher values find what no pixel nearby has found; lower values find surfaces that see the same lights.
+    #[arg(long, value_name = "PIXELS", default_value_t = RestirSettings::default().radius)]
+    pub(crate) restir_radius: f32,
+    /// `restir`: frames that a kept sample counts as, at most; 0 keeps none
+    ///
+    /// Higher values have less noise in each frame; lower values make frames depend less on each other, so that their mean converges faster.
+    #[arg(long, value_name = "FRAMES", default_value_t = RestirSettings::default().history)]
+    pub(crate) restir_history: u32,
+}
+
+impl RestirArgs {
+    fn settings(&self) -> RestirSettings {
+        RestirSettings {
+            candidates: self.restir_candidates,
+            neighbors: self.restir_neighbors,
+            radius: self.restir_radius,
+            history: self.restir_history,
+        }
+    }
 }
 
 /// How much work to do; with both, whichever comes first.
@@ -187,6 +225,7 @@ impl LightArgs {
             candidates: self.candidates,
             seed: self.seed,
             oracle_passes: self.oracle_passes,
+            restir: self.restir.settings(),
             pixel_filter: self.pixel_filter.into(),
             pixel_sampler: self.pixel_sampler,
             mis: self.mis,
@@ -239,6 +278,9 @@ pub(crate) fn default_method() -> &'static str {
 /// What a method does, in a few words.
 pub(crate) fn describe(method: Method) -> &'static str {
     match method {
+        Method::Restir => {
+            "preview: samples are kept from frame to frame and shared by neighbours; few frames look good, many do not average well"
+        }
         Method::Exact => "all lights at every point: the judge, slow",
         Method::Oracle => "research: the best possible choice at first hits, whose preparation is not counted as time",
         Method::Sampled(kind) => match kind {

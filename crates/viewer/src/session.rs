@@ -7,7 +7,7 @@ use crate::progress::Progress;
 use crate::{machine, message, output};
 use anyhow::{Context, Result, bail};
 use render::gpu::Gpu;
-use render::{Film, FrameLoop, GpuFault, RenderError, SceneRef, Settings};
+use render::{Film, FrameLoop, GpuFault, Method, RenderError, SceneRef, Settings};
 use scene::{Camera, Scene};
 use std::path::Path;
 use std::sync::Arc;
@@ -146,7 +146,9 @@ pub(crate) fn start<'s>(
     settings: &Settings,
 ) -> Result<Box<dyn FrameLoop<'s> + 's>> {
     // Compensated sums, moments, finished image and what the file writer copies; auxiliary images about double it.
-    let bytes_per_pixel = if settings.aovs { 256 } else { 128 } + if settings.adaptive_pixels { 64 } else { 0 };
+    let bytes_per_pixel = if settings.aovs { 256 } else { 128 }
+        + if settings.adaptive_pixels { 64 } else { 0 }
+        + if settings.method == Method::Restir { 128 } else { 0 };
     let bytes = u64::from(settings.width) * u64::from(settings.height) * bytes_per_pixel;
     if machine::available_memory_bytes().is_some_and(|available| bytes > available) {
         let (gib, size) = (bytes as f64 / (1u64 << 30) as f64, (settings.width, settings.height));

@@ -158,13 +158,13 @@ impl<'s, F: Frames> Rendering<'s, F> {
                 seed: settings.seed,
                 frame: 0,
                 light_samples: match settings.method {
-                    Method::Exact => 1,
+                    Method::Exact | Method::Restir => 1,
                     _ => settings.light_samples,
                 },
                 // The others choose with the reflection in mind already.
                 candidates: match settings.method {
                     Method::Exact | Method::Oracle => 1,
-                    Method::Sampled(_) => settings.candidates,
+                    Method::Sampled(_) | Method::Restir => settings.candidates,
                 },
             },
             camera: camera.clone(),

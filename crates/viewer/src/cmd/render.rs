@@ -201,6 +201,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         );
     }
     settings.check()?;
+    if settings.method == Method::Restir {
+        refuse_dependent_frames(args, format)?;
+    }
     if settings.light.ignore_below > 0.0 {
         message::warn("--ignore-below drops lights: the image is biased, and marked so in its metadata and statistics");
     }
@@ -314,6 +317,23 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         ));
     }
     Ok(if interrupted { Status::Interrupted } else { Status::Done })
+}
+
+/// Refuses what needs frames that do not depend on each other.
+fn refuse_dependent_frames(args: &RenderArgs, format: Format) -> Result<()> {
+    if args.resume.is_some() || args.shard.is_some() || format == Format::Part {
+        bail!(
+            "--resume, --shard and .part files cannot be had with --sampler restir: no file holds the samples that it keeps from frame to frame; \
+             render with another sampler"
+        );
+    }
+    if args.aov.contains(&Aov::Variance) {
+        bail!(
+            "--aov variance cannot be had with --sampler restir: its frames depend on each other, so that no variance can be estimated from them; \
+             leave it out, or render with another sampler"
+        );
+    }
+    Ok(())
 }
 
 /// A rendering that is to be written.
