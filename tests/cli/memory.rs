@@ -114,5 +114,6 @@ fn budgets_that_cannot_be_are_refused() {
     let with = |more: &[&'static str]| render("demo:one-light", &[&["--memory-budget=1G"], more].concat());
     refused(folder, &with(&["--backend=gpu"]), &["--memory-budget", "GPU"]);
     refused(folder, &with(&["--sampler=oracle"]), &["--memory-budget", "oracle"]);
+    refused(folder, &with(&["--sampler=restir"]), &["--memory-budget", "restir"]);
     refused(folder, &with(&["--build-all"]), &["--memory-budget", "--build-all"]);
 }

@@ -83,7 +83,7 @@ impl Frames for Restir {
     }
 
     /// Two passes with a barrier between: each reads what the other has finished, so that threads share nothing that changes.
-    fn render<const AOVS: bool>(&mut self, eye: &Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
+    fn render<const AOVS: bool>(&mut self, eye: &mut Eye<'_>, film: &mut Film, stop: &AtomicBool) -> (Counters, bool) {
         let view = eye.view(&self.tree);
         let settings = &self.settings;
         let stopped = || stop.load(Ordering::Relaxed);

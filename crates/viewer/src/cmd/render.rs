@@ -167,8 +167,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         if args.light.one_backend()? == Backend::Gpu {
             bail!("--memory-budget: the GPU holds the whole scene; leave it away, or use --backend cpu");
         }
-        if args.sampler == Method::Oracle {
-            bail!("--memory-budget: `oracle` looks at everything beforehand; use another --sampler");
+        if let Method::Oracle | Method::Restir = args.sampler {
+            let name = args.sampler.name();
+            bail!("--memory-budget: `{name}` looks at the whole image at a time; use another --sampler");
         }
         #[cfg(unix)]
         allocator::give_back_what_is_freed();
