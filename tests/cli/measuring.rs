@@ -77,7 +77,8 @@ fn oracle_is_marked_as_research() {
         "bench",
         "demo:rooms:64",
         "--samplers=tree,oracle",
-        "--time=0.02",
+        // Enough for the two frames that are compared, also where other work goes on.
+        "--time=0.3",
         "--width=32",
         "--height=24",
     ];

@@ -1,28 +1,28 @@
 //! `render`: an image to a file.
 
+mod checks;
+mod file;
 pub(crate) mod parts;
+mod report;
 mod sequence;
 mod stats;
 
-#[cfg(unix)]
-use crate::allocator;
-use crate::cli::{Backend, BudgetArgs, LightArgs, SizeArgs, any_method, bytes, default_method};
+use crate::cli::{BudgetArgs, LightArgs, SizeArgs, any_method, bytes, default_method};
 use crate::exit::Status;
 use crate::interrupt::Watch;
 use crate::output::is_stdout;
-use crate::session::{self, BackEnd, Budget, Origin};
+use crate::session::{self, BackEnd, Budget};
 use crate::tev::Display;
-use crate::{machine, message, output, table};
+use crate::{message, output};
 use anyhow::{Context, Result, bail};
-use clap::{Args, ValueEnum};
-use glam::Vec3;
+use clap::Args;
+use file::{Aov, Made};
+pub(crate) use file::{Format, metadata_of};
 use parts::{Header, Shard};
-use render::image::{self, Channel};
-use render::{Film, Method, RenderStats, Settings};
-use scene::Scene;
+use render::{Method, image};
 use sequence::SequenceArgs;
 use stats::Stats;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 /// How often the file of --resume is brought up to date. Higher values write less; lower values lose less if the machine stops.
@@ -95,59 +95,6 @@ pub(crate) struct RenderArgs {
     display_server: Option<String>,
 }
 
-/// Layers besides the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Aov {
-    /// diffuse albedo plus specular reflectance (albedo.R .G .B)
-    Albedo,
-    /// shading normal, world space (normal.X .Y .Z)
-    Normal,
-    /// distance from the camera in metres (depth.Z)
-    Depth,
-    /// world position in metres (position.X .Y .Z)
-    Position,
-    /// index of the light chosen by the last sample, -1 for none (light.V)
-    Light,
-    /// variance of the pixel's mean luminance (variance.V)
-    Variance,
-    /// samples that the pixel has taken (samples.V)
-    Samples,
-}
-
-/// The file formats of images.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Format {
-    /// Linear.
-    Exr,
-    /// Tone-mapped.
-    Png,
-    /// The state of the rendering.
-    Part,
-}
-
-impl Format {
-    /// By the ending of a file's name.
-    ///
-    /// # Errors
-    /// Other endings.
-    pub(crate) fn of(path: &Path) -> Result<Self> {
-        match path
-            .extension()
-            .and_then(|e| e.to_str())
-            .map(str::to_ascii_lowercase)
-            .as_deref()
-        {
-            Some("exr") => Ok(Self::Exr),
-            Some("png") => Ok(Self::Png),
-            Some("part") => Ok(Self::Part),
-            _ => bail!(
-                "{}: unknown image format; give a file name that ends in .exr or .png",
-                path.display()
-            ),
-        }
-    }
-}
-
 /// Reads an error to stop at.
 fn error_bound(text: &str) -> Result<f64, String> {
     let value = text
@@ -163,50 +110,19 @@ fn error_bound(text: &str) -> Result<f64, String> {
 /// Bad input; files that cannot be written.
 pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
     const DEFAULT_SPP: u64 = 64;
-    if args.memory_budget.is_some() {
-        if args.light.one_backend()? == Backend::Gpu {
-            bail!("--memory-budget: the GPU holds the whole scene; leave it away, or use --backend cpu");
-        }
-        if let Method::Oracle | Method::Restir = args.sampler {
-            let name = args.sampler.name();
-            bail!("--memory-budget: `{name}` looks at the whole image at a time; use another --sampler");
-        }
-        #[cfg(unix)]
-        allocator::give_back_what_is_freed();
-    }
+    checks::memory_budget(args)?;
     let format = Format::of(&args.output)?;
-    if format == Format::Png && !args.aov.is_empty() {
-        bail!("a PNG has no layers for --aov; write an .exr");
-    }
-    if args.exposure.is_some_and(|stops| !stops.is_finite()) {
-        bail!("--exposure must be a finite number of stops");
-    }
-    if format == Format::Exr && args.exposure.is_some() {
-        message::warn("--exposure is for PNG only: an EXR holds the radiance as it is");
-    }
+    let settings = checks::settings(args, format)?;
     let sequence = args.sequence.frames(&args.output)?;
-    output::check_writable(&args.output)?;
-    if let Some(path) = args.stats.as_deref().filter(|path| !is_stdout(path)) {
+    for path in [
+        Some(&args.output),
+        args.stats.as_ref().filter(|path| !is_stdout(path)),
+        args.resume.as_ref(),
+    ]
+    .into_iter()
+    .flatten()
+    {
         output::check_writable(path)?;
-    }
-    if let Some(path) = &args.resume {
-        output::check_writable(path)?;
-    }
-    let mut settings = args.light.settings(args.sampler, args.size.or((1280, 720)));
-    // The film knows the others in any case.
-    settings.aovs = args.aov.iter().any(|aov| ![Aov::Variance, Aov::Samples].contains(aov));
-    settings.adaptive_pixels = args.target_error.is_some();
-    if settings.adaptive_pixels && format == Format::Part {
-        bail!(
-            "parts of renderings with --target-error cannot be joined: give an .exr or .png, or leave out --target-error"
-        );
-    }
-    settings.check()?;
-    if settings.method == Method::Restir {
-        refuse_dependent_frames(args, format)?;
-    }
-    if settings.light.ignore_below > 0.0 {
-        message::warn("--ignore-below drops lights: the image is biased, and marked so in its metadata and statistics");
     }
 
     session::use_threads(args.light.threads)?;
@@ -292,7 +208,7 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
                 stats: &stats,
                 settings: &settings,
             };
-            write(&args.output, format, &args.aov, exposure, &made)?;
+            file::write(&args.output, format, &args.aov, exposure, &made)?;
         }
     }
     // After the image: what is finished is kept even if there is no room for this.
@@ -307,9 +223,9 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
             output::write(path, json.as_bytes())?
         }
     }
-    summary(args, frames.scene(), &origin, &settings, &run);
+    report::summary(args, frames.scene(), &origin, &settings, &run);
     if let Some(target) = args.target_error {
-        message::note(report(frames.film(), target));
+        message::note(report::report(frames.film(), target));
     }
     if run.nonfinite_samples > 0 {
         message::warn(format!(
@@ -318,187 +234,4 @@ pub(crate) fn run(args: &RenderArgs) -> Result<Status> {
         ));
     }
     Ok(if interrupted { Status::Interrupted } else { Status::Done })
-}
-
-/// Refuses what needs frames that do not depend on each other.
-fn refuse_dependent_frames(args: &RenderArgs, format: Format) -> Result<()> {
-    if args.resume.is_some() || args.shard.is_some() || format == Format::Part {
-        bail!(
-            "--resume, --shard and .part files cannot be had with --sampler restir: no file holds the samples that it keeps from frame to frame; \
-             render with another sampler"
-        );
-    }
-    if args.aov.contains(&Aov::Variance) {
-        bail!(
-            "--aov variance cannot be had with --sampler restir: its frames depend on each other, so that no variance can be estimated from them; \
-             leave it out, or render with another sampler"
-        );
-    }
-    Ok(())
-}
-
-/// A rendering that is to be written.
-struct Made<'m> {
-    film: &'m Film,
-    scene: &'m Scene,
-    stats: &'m Stats,
-    settings: &'m Settings,
-}
-
-/// Writes the film's image: a PNG at that exposure, or an EXR with the layers asked for.
-fn write(path: &Path, format: Format, aovs: &[Aov], exposure: f32, made: &Made<'_>) -> Result<()> {
-    let image = made.film.image();
-    if format == Format::Png {
-        image::write_png(path, &image, exposure)?;
-        return Ok(());
-    }
-    let mut channels = Channel::rgb("", &image).to_vec();
-    layers(aovs, made.film, made.scene, &mut channels);
-    let metadata = metadata(made.stats, made.settings)?;
-    image::write_exr(path, image.width, image.height, &channels, &metadata)?;
-    Ok(())
-}
-
-/// The layers asked for, as channels.
-fn layers(wanted: &[Aov], film: &Film, scene: &Scene, channels: &mut Vec<Channel>) {
-    let one = |name: &str, values: Vec<f32>| Channel {
-        name: name.into(),
-        values,
-    };
-    let vector = |layer: &str, image: &render::Image| {
-        [("X", 0), ("Y", 1), ("Z", 2)].map(|(axis, c)| Channel {
-            name: format!("{layer}.{axis}"),
-            values: image.pixels.iter().map(|pixel| pixel[c]).collect(),
-        })
-    };
-    if wanted.contains(&Aov::Variance) {
-        channels.push(one("variance.V", film.variance()));
-    }
-    if wanted.contains(&Aov::Samples) {
-        channels.push(one(
-            "samples.V",
-            film.samples().iter().map(|&count| count as f32).collect(),
-        ));
-    }
-    let Some(mut aovs) = film.aovs() else { return };
-    if wanted.contains(&Aov::Albedo) {
-        channels.extend(Channel::rgb("albedo", &aovs.albedo));
-    }
-    if wanted.contains(&Aov::Normal) {
-        channels.extend(vector("normal", &aovs.normal));
-    }
-    if wanted.contains(&Aov::Position) {
-        let seen = aovs.position.pixels.iter_mut().zip(&aovs.depth);
-        for (position, _) in seen.filter(|(_, depth)| depth.is_finite()) {
-            *position = scene.parts.in_file(Vec3::from(*position)).as_vec3().to_array();
-        }
-        channels.extend(vector("position", &aovs.position));
-    }
-    if wanted.contains(&Aov::Depth) {
-        channels.push(one("depth.Z", aovs.depth));
-    }
-    if wanted.contains(&Aov::Light) {
-        channels.push(one("light.V", aovs.light));
-    }
-}
-
-/// What an EXR tells about itself: one attribute per figure, and all settings as JSON.
-fn metadata(stats: &Stats, settings: &Settings) -> Result<Vec<(String, String)>> {
-    let entry = |name: &str, value: String| (format!("manylight.{name}"), value);
-    Ok(vec![
-        entry("version", machine::VERSION.into()),
-        entry("scene", stats.scene.clone()),
-        entry("camera", stats.camera.clone()),
-        entry("sampler", stats.sampler.into()),
-        entry("spp", stats.spp.to_string()),
-        entry("seed", stats.seed.to_string()),
-        entry("render_s", stats.render_s.to_string()),
-        entry("research", stats.research.unwrap_or("no").into()),
-        entry("biased", stats.biased.clone().unwrap_or_else(|| "no".into())),
-        entry("settings", serde_json::to_string(settings)?),
-    ])
-}
-
-/// What an EXR that was joined from parts tells about itself.
-///
-/// # Errors
-/// None that can be expected.
-pub(crate) fn metadata_of(header: &Header, spp: u64) -> Result<Vec<(String, String)>> {
-    let entry = |name: &str, value: String| (format!("manylight.{name}"), value);
-    Ok(vec![
-        entry("version", machine::VERSION.into()),
-        entry("scene", header.scene.clone()),
-        entry("camera", header.camera.clone()),
-        entry("sampler", header.settings.method.name().into()),
-        entry("spp", spp.to_string()),
-        entry("settings", serde_json::to_string(&header.settings)?),
-    ])
-}
-
-/// How good an image has become that was to have an error of `target`.
-fn report(film: &Film, target: f64) -> String {
-    let counts = film.sample_counts();
-    let samples = format!(
-        "{:.1} samples per pixel, {} to {}, median {}; skipped {:.0} % of the times",
-        counts.mean,
-        counts.least,
-        counts.most,
-        counts.median,
-        100.0 * counts.skipped
-    );
-    let Some(error) = film.estimated_error() else {
-        return format!("too few samples to tell the error; {samples}");
-    };
-    let converged = 100.0 * film.converged(target);
-    format!(
-        "estimated relMSE {:.2e}, with 95 % confidence {:.2e} to {:.2e} ({} {target}), but for rare light that no sample has met; \
-         by itself below that, as sure: {converged:.0} % of the pixels; {samples}",
-        error.relmse,
-        error.low,
-        error.high,
-        if error.high <= target { "asked for" } else { "NOT the" },
-    )
-}
-
-/// What was done, for people.
-fn summary(args: &RenderArgs, scene: &Scene, origin: &Origin, settings: &Settings, run: &RenderStats) {
-    let samples = u64::from(settings.width) * u64::from(settings.height) * run.frames;
-    message::note(format!(
-        "{}: {} x {}, {} spp in {:.2} s, {:.2} Msamples/s, sampler {}, {} lights, {} triangles \
-         (load {:.2} s, BVH {:.2} s, lights {:.2} s)",
-        args.output.display(),
-        settings.width,
-        settings.height,
-        run.frames,
-        run.render_s,
-        samples as f64 / run.render_s.max(1e-9) * 1e-6,
-        settings.method.name(),
-        table::thousands(scene.lights.len() as u64),
-        table::thousands(scene.triangle_count()),
-        origin.load_s,
-        scene.build_s,
-        run.light_build_s,
-    ));
-    if let Some(note) = settings.method.research_note() {
-        message::note(format!(
-            "{}: {note} ({:.2} s here)",
-            settings.method.name(),
-            run.prepare_s
-        ));
-    }
-    let memory = scene.memory().used();
-    if let Some(budget) = memory.budget_bytes {
-        let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-        message::note(format!(
-            "memory budget {:.1} MiB: at most {:.1} MiB were made on demand, {:.1} MiB are there; made {} times, of these {} again",
-            mib(budget),
-            mib(memory.peak_bytes),
-            mib(memory.resident_bytes),
-            table::thousands(memory.made),
-            table::thousands(memory.made_again),
-        ));
-    }
-    for skipped in stats::skipped(scene, run) {
-        message::detail(format!("skipped: {skipped}"));
-    }
 }

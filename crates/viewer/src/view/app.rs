@@ -18,7 +18,7 @@ use super::views::View;
 use crate::cli::Backend;
 use crate::exit::Status;
 use crate::{message, session};
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 use glam::Vec3;
 use render::Settings;
 use scene::{Camera, Scene};
@@ -393,7 +393,7 @@ impl App {
     }
 
     /// What a thread tells.
-    pub(super) fn hear(&mut self, event: Event) {
+    pub(super) fn hear(&mut self, event_loop: &ActiveEventLoop, event: Event) {
         match event {
             Event::Renderer(Report::Picture) => {}
             Event::Renderer(Report::Inspected(found)) => self.inspection = found.map(|found| *found),
@@ -408,6 +408,12 @@ impl App {
             }
             Event::Renderer(Report::Trouble(text)) => self.say(text),
             Event::Renderer(Report::Device(backend)) => self.backend = backend,
+            Event::Renderer(Report::Failed) => {
+                self.fail(
+                    event_loop,
+                    anyhow!("the renderer has failed, which is a defect of this program"),
+                );
+            }
             Event::Loaded(what, result) => self.enter(what, *result),
         }
         self.request_frame();

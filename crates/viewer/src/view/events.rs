@@ -21,8 +21,8 @@ impl ApplicationHandler<Event> for App {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, event: Event) {
-        self.hear(event);
+    fn user_event(&mut self, event_loop: &ActiveEventLoop, event: Event) {
+        self.hear(event_loop, event);
     }
 
     fn about_to_wait(&mut self, _: &ActiveEventLoop) {

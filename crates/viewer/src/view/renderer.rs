@@ -21,6 +21,7 @@ use device::Device;
 use render::Settings;
 use stage::Stage;
 use std::cell::Cell;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -67,9 +68,12 @@ impl Renderer {
             device: Device::new(backend),
             stage: None,
         };
-        let thread = std::thread::Builder::new()
-            .name("renderer".into())
-            .spawn(move || worker.run())?;
+        let thread = std::thread::Builder::new().name("renderer".into()).spawn(move || {
+            // The message of a panic is on stderr by then.
+            if catch_unwind(AssertUnwindSafe(|| worker.run())).is_err() {
+                (worker.tell)(Report::Failed);
+            }
+        })?;
         Ok(Self {
             commands: Some(commands),
             sent: Cell::new(0),

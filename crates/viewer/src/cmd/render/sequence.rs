@@ -1,7 +1,8 @@
 //! `render --camera-path`: an image for each frame of a camera path.
 
+use super::RenderArgs;
+use super::file::{self, Format, Made};
 use super::stats::Stats;
-use super::{Format, Made, RenderArgs, write};
 use crate::camera_path::{self, Frames};
 use crate::exit::Status;
 use crate::interrupt::Watch;
@@ -131,7 +132,7 @@ pub(super) fn run(
             stats: &stats,
             settings,
         };
-        write(file, format, &args.aov, exposure, &made)?;
+        file::write(file, format, &args.aov, exposure, &made)?;
         message::note(format!(
             "{}: {} spp, frame {number} of {count}",
             file.display(),

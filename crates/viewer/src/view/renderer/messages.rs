@@ -81,6 +81,8 @@ pub(in crate::view) enum Report {
     Trouble(String),
     /// This renders from now on: what was asked for cannot.
     Device(Backend),
+    /// The thread has panicked: there will be no more pictures.
+    Failed,
 }
 
 /// A picture to be shown.
