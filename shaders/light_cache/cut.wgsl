@@ -182,7 +182,7 @@ fn entry_branch(cut: Cut, entry: u32) -> u32 {
 // Where the part after a running sum ends in an interval of `width`: (sum / total) x width, rounded up, by long division of the two
 // significands, so that it never falls as the sum grows and ends at the width.
 // Differs: the CPU works in double precision; boundaries agree to about 2^-50 of the width.
-// twin: crates/light-cache/src/adaptive/weights.rs end
+// twin: crates/light-cache/src/adaptive/cut.rs end
 fn boundary(sum: f32, total: f32, width: vec2<u32>) -> vec2<u32> {
     if sum >= total {
         return width;
@@ -233,7 +233,7 @@ fn boundary(sum: f32, total: f32, width: vec2<u32>) -> vec2<u32> {
 }
 
 // Running sums in the order in which the CPU adds them: groups of four side by side, then the groups.
-// twin: crates/light-cache/src/adaptive/weights.rs new
+// twin: crates/light-cache/src/adaptive/cut.rs new
 fn running_sums(weights: array<f32, LANES>) -> array<f32, LANES> {
     var sums = weights;
     for (var i = 1u; i < 4u; i++) {
