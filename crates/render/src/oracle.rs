@@ -9,7 +9,6 @@
 //! drawing from the BSDF finds lights too, f_i is weighed as if light i had been chosen for certain, so there the
 //! choice is nearly the best only.
 
-use crate::choosing::Choosing;
 use crate::direct::{Connection, Direct, DirectLight, LightNumbers, OneLight, Vertex};
 use crate::exact::AllLights;
 use crate::film::{AovSample, Tile};
@@ -17,7 +16,7 @@ use crate::frame::{Eye, Frames};
 use crate::path::{Counters, FrameView, Probe, Start, TileLog, path};
 use crate::{Film, Settings};
 use glam::{Vec2, Vec3};
-use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
+use light_cache::{Choice, LightRecord, LightSampler, Observation, SamplerStats, ShadingPoint};
 use rayon::prelude::*;
 use sampling::hash::hash2;
 use sampling::{Discrete, unit_f32};
@@ -131,26 +130,6 @@ impl Frames for Oracle {
             bytes: self.tiles.iter().flatten().map(Pixel::bytes).sum(),
             ..SamplerStats::default()
         })
-    }
-
-    fn light_records(&self, _scene: &Scene) -> Vec<LightRecord> {
-        Vec::new()
-    }
-
-    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
-        Vec::new()
-    }
-
-    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
-        vec![None; points.len()]
-    }
-
-    fn light_probabilities(&self, _scene: &Scene, _points: &[ShadingPoint]) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn choosing(&self, _eye: &Eye<'_>) -> Option<Choosing> {
-        None
     }
 }
 

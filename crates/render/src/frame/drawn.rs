@@ -114,10 +114,6 @@ impl<D: DirectLight> Frames for Drawn<D> {
         self.direct.scene_changed(scene);
     }
 
-    fn prepare_s(&self) -> f64 {
-        0.0
-    }
-
     fn sampler_stats(&self) -> Option<SamplerStats> {
         self.direct.sampler_stats()
     }

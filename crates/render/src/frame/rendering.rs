@@ -101,31 +101,47 @@ pub(crate) trait Frames: Send {
     fn scene_changed(&mut self, scene: &Scene);
 
     /// See [`RenderStats::prepare_s`].
-    fn prepare_s(&self) -> f64;
+    fn prepare_s(&self) -> f64 {
+        0.0
+    }
 
     /// What a sampler can tell about itself; `None` if there is none.
     fn sampler_stats(&self) -> Option<SamplerStats>;
 
     /// The frame with which the current sequence of random numbers began, and what was learned; `None` if that cannot be told.
-    fn save(&self) -> Option<(u32, Vec<u8>)>;
+    fn save(&self) -> Option<(u32, Vec<u8>)> {
+        None
+    }
 
     /// Takes over what [`Frames::save`] has told; returns whether it could.
-    fn restore(&mut self, first_frame: u32, learned: &[u8]) -> bool;
+    fn restore(&mut self, _first_frame: u32, _learned: &[u8]) -> bool {
+        false
+    }
 
     /// See [`FrameLoop::light_records`].
-    fn light_records(&self, scene: &Scene) -> Vec<LightRecord>;
+    fn light_records(&self, _scene: &Scene) -> Vec<LightRecord> {
+        Vec::new()
+    }
 
     /// See [`FrameLoop::cells`].
-    fn cells(&self, scene: &Scene) -> Vec<CellRecord>;
+    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
+        Vec::new()
+    }
 
     /// See [`FrameLoop::cells_at`].
-    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>>;
+    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
+        vec![None; points.len()]
+    }
 
     /// See [`FrameLoop::light_probabilities`].
-    fn light_probabilities(&self, scene: &Scene, points: &[ShadingPoint]) -> Vec<f64>;
+    fn light_probabilities(&self, _scene: &Scene, _points: &[ShadingPoint]) -> Vec<f64> {
+        Vec::new()
+    }
 
     /// See [`FrameLoop::choosing`].
-    fn choosing(&self, eye: &Eye<'_>) -> Option<Choosing>;
+    fn choosing(&self, _eye: &Eye<'_>) -> Option<Choosing> {
+        None
+    }
 }
 
 /// A rendering with one way of making frames.

@@ -7,7 +7,6 @@ use super::path_pass::PathPass;
 use super::refusal;
 use super::target::Target;
 use super::timing::{Pass, PassTime, Timer};
-use crate::choosing::Choosing;
 use crate::direct::OneLight;
 use crate::frame::{Drawn, Eye, Frames};
 use crate::path::{Counters, sequence_since};
@@ -193,6 +192,7 @@ impl<S: LightSampler> GpuFrames<S> {
     }
 }
 
+/// State is not told, for the film is on the device, nor what choosing costs there.
 impl<S: LightSampler> Frames for GpuFrames<S> {
     fn look(&mut self, eye: &Eye<'_>, film: &mut Film) {
         self.drawn.direct.0.set_eye(eye.camera.origin_ws);
@@ -269,10 +269,6 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
         self.timer.as_ref().map_or_else(Vec::new, Timer::times)
     }
 
-    fn prepare_s(&self) -> f64 {
-        0.0
-    }
-
     fn sampler_stats(&self) -> Option<SamplerStats> {
         self.drawn.sampler_stats()
     }
@@ -291,19 +287,5 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
 
     fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
         self.drawn.cells_at(points)
-    }
-
-    /// The film is on the device: no state is told.
-    fn save(&self) -> Option<(u32, Vec<u8>)> {
-        None
-    }
-
-    fn restore(&mut self, _first_frame: u32, _learned: &[u8]) -> bool {
-        false
-    }
-
-    /// Not measured on the device.
-    fn choosing(&self, _eye: &Eye<'_>) -> Option<Choosing> {
-        None
     }
 }

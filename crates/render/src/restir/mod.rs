@@ -31,7 +31,6 @@ mod temporal;
 
 pub use settings::RestirSettings;
 
-use crate::choosing::Choosing;
 use crate::direct::{Direct, DirectLight, LightNumbers, OneLight, Vertex};
 use crate::film::{AovSample, Tile};
 use crate::frame::{Eye, Frames};
@@ -40,7 +39,7 @@ use crate::{Film, Settings};
 use glam::Vec3;
 use join::join;
 use layer::{Layer, Pixel, Seen};
-use light_cache::{CellRecord, LightRecord, LightSampler, SamplerStats, ShadingPoint, TreeSampler};
+use light_cache::{LightSampler, SamplerStats, ShadingPoint, TreeSampler};
 use rayon::prelude::*;
 use sampling::{Random, unit_f64};
 use scene::Scene;
@@ -129,45 +128,12 @@ impl Frames for Restir {
         self.before.clear();
     }
 
-    fn prepare_s(&self) -> f64 {
-        0.0
-    }
-
     fn sampler_stats(&self) -> Option<SamplerStats> {
         let tree = self.tree.0.stats();
         Some(SamplerStats {
             bytes: tree.bytes + self.before.bytes() + self.fresh.bytes(),
             ..tree
         })
-    }
-
-    /// The samples are not told.
-    fn save(&self) -> Option<(u32, Vec<u8>)> {
-        None
-    }
-
-    fn restore(&mut self, _first_frame: u32, _learned: &[u8]) -> bool {
-        false
-    }
-
-    fn light_records(&self, _scene: &Scene) -> Vec<LightRecord> {
-        Vec::new()
-    }
-
-    fn cells(&self, _scene: &Scene) -> Vec<CellRecord> {
-        Vec::new()
-    }
-
-    fn cells_at(&self, points: &[ShadingPoint]) -> Vec<Option<u64>> {
-        vec![None; points.len()]
-    }
-
-    fn light_probabilities(&self, _scene: &Scene, _points: &[ShadingPoint]) -> Vec<f64> {
-        Vec::new()
-    }
-
-    fn choosing(&self, _eye: &Eye<'_>) -> Option<Choosing> {
-        None
     }
 }
 
