@@ -148,6 +148,7 @@ fn learn<S: LightSampler>(sampler: &mut S, scene: &Scene, points: &[ShadingPoint
                 pmf: choice.pmf,
                 visible: !scene.occluded(&ray, PrimitiveId::NONE, to),
                 weight: 1,
+                bounce: None,
             })
         });
         let log: Vec<Observation> = observations.collect();

@@ -27,6 +27,7 @@ mod tree_visible;
 mod uniform;
 
 use glam::Vec3;
+use sampling::HemisphereGuide;
 use scene::Scene;
 use std::fmt::Debug;
 
@@ -97,6 +98,17 @@ pub struct Observation {
     pub visible: bool,
     /// How many such observations it stands for: 1, or more if others like it were left out.
     pub weight: u32,
+    /// What the path found that went on from there; `None` if it did not.
+    pub bounce: Option<Bounce>,
+}
+
+/// What a path found in the direction in which it left a vertex.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+pub struct Bounce {
+    /// The part of the hemisphere ([`sampling::guide::part_of`]).
+    pub part: u16,
+    /// Luminance of the radiance that came from there, as far as the path found it, over the share of the light that is reflected. Finite.
+    pub radiance: f32,
 }
 
 /// Counters and shares a sampler can tell about itself, for `--stats` and `info`.
@@ -230,6 +242,16 @@ pub trait LightSampler: Debug + Send + Sync {
         for (light, sum) in (0..).zip(sum) {
             *sum += f64::from(self.pmf(local, light));
         }
+    }
+
+    /// Whether it wants to know what paths find that go on from where they asked for light ([`Observation::bounce`]).
+    fn guides(&self) -> bool {
+        false
+    }
+
+    /// How the diffuse lobe is drawn by a path that goes on from here; `None` if nothing is known.
+    fn guide<'a>(&'a self, _local: &Self::Local<'a>) -> Option<&'a HemisphereGuide> {
+        None
     }
 
     /// Where it is in the course of its learning.

@@ -2,6 +2,7 @@
 
 use crate::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, Packed, SamplerStats, ShadingPoint};
 use glam::Vec3;
+use sampling::HemisphereGuide;
 use sampling::hemisphere::uniform_sphere;
 use sampling::{Random, unit_f32};
 use scene::Scene;
@@ -127,6 +128,15 @@ impl<S: LightSampler> LightSampler for Recording<S> {
     #[inline]
     fn sample_each(&self, local: &Self::Local<'_>, us: &[u32], choices: &mut [Option<Choice>]) {
         self.inner.sample_each(local, us, choices);
+    }
+
+    fn guides(&self) -> bool {
+        self.inner.guides()
+    }
+
+    #[inline]
+    fn guide<'a>(&'a self, local: &Self::Local<'a>) -> Option<&'a HemisphereGuide> {
+        self.inner.guide(local)
     }
 
     fn pace(&self) -> Pace {

@@ -224,6 +224,7 @@ mod tests {
             pmf: if light % 100 == 7 { 0.02 } else { 1.0 },
             visible: true,
             weight: 1,
+            bounce: None,
         };
         (0..count).map(observation).collect()
     }

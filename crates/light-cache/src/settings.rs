@@ -62,6 +62,10 @@ pub struct Settings {
     /// `adaptive`: what each light is expected to bring to a point is added up, and draws only find out by how much it is off (a control
     /// variate; pixels may come out below zero). On: less noise; off: less work at every point.
     pub control_variate: bool,
+    /// `adaptive`: paths leave a surface more often to where earlier ones found light. On: less noise in light that arrives by way of other
+    /// surfaces; off: no memory for directions.
+    #[serde(default = "on")]
+    pub guided_bounces: bool,
     /// `octree`: halvings of the scene's bounding cube per axis, 0..=7. Higher values fit lights to smaller places; lower
     /// values fill fewer cells. 5.
     pub octree_depth: u32,
@@ -73,6 +77,10 @@ pub struct Settings {
     pub choose_among_one: bool,
 }
 
+fn on() -> bool {
+    true
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Self {
@@ -80,6 +88,7 @@ impl Default for Settings {
             table_decay: 0.9,
             ignore_below: 0.0,
             control_variate: true,
+            guided_bounces: on(),
             octree_depth: 5,
             octree_bright: 64,
             choose_among_one: false,

@@ -1,8 +1,9 @@
 //! Lights, points and checks that the tests of all samplers share.
 
-use crate::{LightSampler, Observation, ShadingPoint};
+use crate::{Bounce, LightSampler, Observation, ShadingPoint};
 use glam::Vec3;
 use sampling::Random;
+use sampling::guide::PARTS;
 use sampling::hemisphere::uniform_sphere;
 use sampling::statistics::{chi_square_p, pooled_chi_square};
 use scene::{Light, LightKind, PrimitiveId, Scene, SceneParts};
@@ -190,6 +191,17 @@ pub(crate) fn check_each_light_is_drawn<S: LightSampler>(sampler: &S, scene: &Sc
     }
 }
 
+/// The part of the hemisphere that light comes from in [`observe`].
+pub(crate) const LIT_PART: u16 = 21;
+
+fn bounce(index: u32) -> Bounce {
+    let part = (index / 2 % PARTS as u32) as u16;
+    Bounce {
+        part,
+        radiance: if part == LIT_PART { 10.0 } else { 0.5 },
+    }
+}
+
 /// What a frame of 4,000 samples would report if the lights for which `visible` holds were visible from everywhere: logs
 /// of several tiles, one of them empty.
 pub(crate) fn observe<S: LightSampler>(
@@ -215,6 +227,7 @@ pub(crate) fn observe<S: LightSampler>(
                 pmf: choice.pmf,
                 visible: visible(choice.light),
                 weight: 1,
+                bounce: (index % 2 == 0).then(|| bounce(index)),
             });
         }
     }

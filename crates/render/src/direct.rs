@@ -5,6 +5,7 @@ use crate::resampling;
 use crate::settings::MAX_LIGHT_SAMPLES;
 use glam::{Vec2, Vec3};
 use light_cache::{CellRecord, Choice, LightRecord, LightSampler, Observation, Pace, SamplerStats, ShadingPoint};
+use sampling::HemisphereGuide;
 use sampling::mis::Heuristic;
 use sampling::{VertexSequence, unit_f32};
 use scene::{PrimitiveId, Ray, Scene, Surface, luminance};
@@ -21,6 +22,8 @@ pub(crate) struct Vertex<'v> {
     pub(crate) shared: Option<Heuristic>,
     /// Lights compared for each one that is drawn; see [`crate::resampling`].
     pub(crate) candidates: u32,
+    /// How the diffuse lobe is drawn where the path goes on; `None`: as it is.
+    pub(crate) guide: Option<&'v HemisphereGuide>,
 }
 
 /// The random numbers of direct light at a vertex, 32 bits each.
@@ -76,6 +79,16 @@ pub(crate) trait DirectLight: Sync + Send {
 
     /// The probability with which [`DirectLight::estimate`] looks at `light`.
     fn pmf(&self, local: &Self::Local<'_>, light: u32) -> f32;
+
+    /// See [`LightSampler::guides`].
+    fn guides(&self) -> bool {
+        false
+    }
+
+    /// See [`LightSampler::guide`].
+    fn guide<'a>(&'a self, _local: &Self::Local<'a>) -> Option<&'a HemisphereGuide> {
+        None
+    }
 
     /// See [`LightSampler::add_pmfs`]; nothing where no choice is made.
     fn add_pmfs(&self, _local: &Self::Local<'_>, _sum: &mut [f64]) {}
@@ -206,6 +219,15 @@ impl<S: LightSampler> DirectLight for OneLight<S> {
         self.0.pmf(local, light)
     }
 
+    fn guides(&self) -> bool {
+        self.0.guides()
+    }
+
+    #[inline]
+    fn guide<'a>(&'a self, local: &Self::Local<'a>) -> Option<&'a HemisphereGuide> {
+        self.0.guide(local)
+    }
+
     fn add_pmfs(&self, local: &Self::Local<'_>, sum: &mut [f64]) {
         self.0.add_pmfs(local, sum);
     }
@@ -276,6 +298,7 @@ pub(crate) fn observation(
         pmf: choice.pmf,
         visible,
         weight: 1,
+        bounce: None,
     }
 }
 
@@ -304,7 +327,7 @@ impl Connection {
         if surface.geometric_normal_ws.dot(point.wi_ws) <= 0.0 {
             return None;
         }
-        let (value, pdf_bsdf) = surface.bsdf.eval_pdf(vertex.wo_ws, point.wi_ws);
+        let (value, pdf_bsdf) = surface.bsdf.eval_pdf_guided(vertex.wo_ws, point.wi_ws, vertex.guide);
         let unweighted = vertex.throughput * value * point.radiance / point.pdf_solid_angle;
         if unweighted == Vec3::ZERO {
             return None;

@@ -6,6 +6,7 @@
 //!
 //! Absent from this crate: windows, the command line. Deterministic for a seed at any thread count.
 
+mod bounces;
 mod choosing;
 mod control;
 mod direct;

@@ -1,21 +1,25 @@
 //! The frame, from the tile down to the last bounce of a path: read it from top to bottom.
 
+mod start;
+
+pub(crate) use start::{Start, Starts};
+
+use crate::bounces::Bounces;
 use crate::control::{PathSample, PixelControl};
 use crate::direct::{DirectLight, LightNumbers, Vertex};
 use crate::film::{AovSample, Tile};
 use crate::filter::FilterSampler;
-use crate::settings::MAX_LIGHT_SAMPLES;
-use glam::{Vec2, Vec3};
+use glam::Vec3;
 use light_cache::{Observation, ShadingPoint};
 use sampling::hash::hash2;
 use sampling::mis::Heuristic;
-use sampling::{PixelSampler, PixelSequence, unit_f32};
+use sampling::{PixelSampler, PixelSequence};
 #[cfg(target_arch = "x86_64")]
 use scene::bvh::Kernel;
-use scene::bvh::{PACKET, Packet};
+use scene::bvh::PACKET;
 use scene::camera::CameraRays;
 use scene::surface::NO_LIGHT;
-use scene::{Bsdf, Hit, PrimitiveId, Ray, Scene, Surface};
+use scene::{Bsdf, PrimitiveId, Ray, Scene, Surface};
 
 /// Above this GGX alpha the BSDF's directions find lights so seldom that the last vertex of a path does not try: light
 /// sampling alone does as well there. Higher values trace more rays; lower values leave noise in reflections of lamps.
@@ -44,6 +48,8 @@ pub(crate) struct FrameView<'f, D> {
     pub(crate) candidates: u32,
     /// Whether any light can be hit, so that drawing from the BSDF can find it.
     pub(crate) area_lights: bool,
+    /// Whether directions are drawn as has been learned, and what they lead to is noted.
+    pub(crate) guided: bool,
 }
 
 impl<D> FrameView<'_, D> {
@@ -200,112 +206,6 @@ fn render_packet<D: DirectLight, const AOVS: bool>(
     }
 }
 
-/// Where the paths of pixels close to each other begin: everything up to the first hit is done for all of them at once.
-pub(crate) struct Starts {
-    pixels: [u32; PACKET],
-    sample: u32,
-    rays: Packet,
-    hits: [Option<Hit>; PACKET],
-    /// For each light sample by dimension: for the choice of a light, the point on it.
-    light_numbers: [[[u32; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize],
-}
-
-/// Where a path begins.
-pub(crate) struct Start {
-    pub(crate) pixel: u32,
-    pub(crate) sample: u32,
-    pub(crate) direction_ws: Vec3,
-    pub(crate) hit: Option<Hit>,
-    /// As many as there are light samples.
-    pub(crate) light_numbers: [LightNumbers; MAX_LIGHT_SAMPLES as usize],
-}
-
-impl Starts {
-    /// In the pixels at these columns and rows. Those beyond the image's edge are of no use, and harmless.
-    #[allow(
-        clippy::needless_range_loop,
-        reason = "pixels are the inner index of what the outer loop fills"
-    )]
-    #[inline(always)]
-    pub(crate) fn new<D>(view: &FrameView<'_, D>, at: &[[u32; 2]; PACKET], sample: u32) -> Self {
-        let sampler = view.pixel_sampler;
-        let in_pixel: [[u32; PACKET]; 2] = sampler.numbers(view.seed, at, view.image_width, sample, 0);
-        let mut light_numbers = [[[0; PACKET]; 3]; MAX_LIGHT_SAMPLES as usize];
-        for (index, numbers) in view.light_sample_indices(sample).zip(&mut light_numbers) {
-            *numbers = sampler.numbers(view.seed, at, view.image_width, index, 2);
-        }
-        let mut rays = Packet {
-            origin_ws: view.camera.origin_ws,
-            directions_ws: [[0.0; PACKET]; 3],
-        };
-        let mut pixels = [0; PACKET];
-        for i in 0..PACKET {
-            let [x, y] = at[i];
-            pixels[i] = y * view.image_width + x;
-            let direction_ws = eye_direction_ws(view, x, y, [in_pixel[0][i], in_pixel[1][i]]).to_array();
-            for axis in 0..3 {
-                rays.directions_ws[axis][i] = direction_ws[axis];
-            }
-        }
-        Self {
-            pixels,
-            sample,
-            hits: view.scene.nearest_of_packet(&rays),
-            rays,
-            light_numbers,
-        }
-    }
-
-    #[inline(always)]
-    pub(crate) fn get(&self, i: usize) -> Start {
-        Start {
-            pixel: self.pixels[i],
-            sample: self.sample,
-            direction_ws: self.rays.direction_ws(i),
-            hit: self.hits[i],
-            light_numbers: self.light_numbers.map(|[choice, u, v]| LightNumbers {
-                choice: choice[i],
-                point: [u[i], v[i]],
-            }),
-        }
-    }
-}
-
-impl Start {
-    /// In one pixel, without its neighbours.
-    pub(crate) fn new<D>(view: &FrameView<'_, D>, x: u32, y: u32) -> Self {
-        let pixel = y * view.image_width + x;
-        let sampler = view.pixel_sampler;
-        let [[u], [v]] = sampler.numbers(view.seed, &[[x, y]], view.image_width, view.frame, 0);
-        let mut light_numbers = [LightNumbers::default(); MAX_LIGHT_SAMPLES as usize];
-        for (index, numbers) in view.light_sample_indices(view.frame).zip(&mut light_numbers) {
-            let [[choice], [u], [v]] = sampler.numbers(view.seed, &[[x, y]], view.image_width, index, 2);
-            *numbers = LightNumbers { choice, point: [u, v] };
-        }
-        let direction_ws = eye_direction_ws(view, x, y, [u, v]);
-        let ray = Ray {
-            origin_ws: view.camera.origin_ws,
-            direction_ws,
-            t_max: f32::INFINITY,
-        };
-        Self {
-            pixel,
-            sample: view.frame,
-            direction_ws,
-            hit: view.scene.nearest(&ray, PrimitiveId::NONE),
-            light_numbers,
-        }
-    }
-}
-
-/// The direction of the eye ray through the pixel in column `x` and row `y`, `u` being 32 bits each.
-#[inline(always)]
-fn eye_direction_ws<D>(view: &FrameView<'_, D>, x: u32, y: u32, u: [u32; 2]) -> Vec3 {
-    let corner = Vec2::new(x as f32, y as f32);
-    let offset = view.filter.offset(Vec2::new(unit_f32(u[0]), unit_f32(u[1])));
-    view.camera.direction_ws(corner + offset)
-}
-
 /// What one path brings back.
 #[inline(always)]
 pub(crate) fn path<D: DirectLight>(
@@ -332,7 +232,10 @@ pub(crate) fn path<D: DirectLight>(
         control: Vec3::ZERO,
     };
     let mut throughput = Vec3::ONE;
+    // What it would be if directions were not guided: a path is worth as much where they are.
+    let mut unguided = Vec3::ONE;
     let mut bounce = 0;
+    let mut bounces = Bounces::default();
     while let Some(hit) = found {
         let surface = scene.surface(&ray, &hit);
 
@@ -352,8 +255,15 @@ pub(crate) fn path<D: DirectLight>(
 
         // Direct light.
         let wo_ws = -ray.direction_ws;
-        let (vertex, continues) = Vertex::of_path(view, &surface, wo_ws, throughput, bounce);
+        let (mut vertex, continues) = Vertex::of_path(view, &surface, wo_ws, throughput, bounce);
         let local = view.direct.local(scene, &vertex.point);
+        // Where no bounce follows, only lamps are looked for.
+        let guided = view.guided && bounce < view.max_bounces;
+        if guided {
+            vertex.guide = view.direct.guide(&local);
+        }
+        let guide = vertex.guide;
+        let observed = log.observations.len();
         let direct = view.direct.estimate(scene, &local, &vertex, light_numbers, log, probe);
         brought.radiance += direct.radiance;
         brought.control += direct.control;
@@ -367,20 +277,25 @@ pub(crate) fn path<D: DirectLight>(
         // Russian roulette on the largest component: luminance would kill saturated blues with large weights.
         let sequence = PixelSequence::new(view.seed, start.pixel, start.sample);
         let numbers = sequence.vertex(bounce);
-        let survival = throughput.max_element().clamp(MIN_SURVIVAL, 1.0);
+        let survival = unguided.max_element().clamp(MIN_SURVIVAL, 1.0);
         let u = numbers.f32(5);
         if u >= survival {
             break;
         }
 
         // The next direction. One that only one of the two normals sees is lost, as it is for light sampling.
-        let Some(sample) = surface.bsdf.sample(wo_ws, u / survival, numbers.vec2(6)) else {
+        let Some(sample) = surface.bsdf.sample_guided(wo_ws, u / survival, numbers.vec2(6), guide) else {
             break;
         };
         if surface.geometric_normal_ws.dot(sample.wi_ws) <= 0.0 {
             break;
         }
         throughput *= sample.value / (sample.pdf_solid_angle * survival);
+        unguided *= sample.value / (sample.pdf_unguided * survival);
+        if guided && log.observations.len() > observed {
+            let normal_ws = surface.bsdf.normal_ws;
+            bounces.begin(observed, normal_ws, sample.wi_ws, brought.radiance, throughput);
+        }
         ray = scene.ray_from(&surface, sample.wi_ws, f32::INFINITY);
         left = Some(Departure {
             local,
@@ -397,6 +312,7 @@ pub(crate) fn path<D: DirectLight>(
         probe.nearest(&ray, surface.id);
         found = scene.nearest(&ray, surface.id);
     }
+    bounces.end(brought.radiance, log.observations);
     brought
 }
 
@@ -449,6 +365,7 @@ impl<'v> Vertex<'v> {
             },
             shared: shared.filter(|_| continues),
             candidates: if glossy { view.candidates } else { 1 },
+            guide: None,
         };
         (vertex, continues)
     }

@@ -43,6 +43,7 @@ pub fn uniform_rays(scene: &Scene, camera: &Camera, settings: &Settings, frame: 
         seed: settings.seed,
         frame,
         area_lights: scene.lights.iter().any(|light| !light.is_delta()),
+        guided: false,
     };
     let mut rays = TracedRays::default();
     let mut film = crate::Film::new(settings.width, settings.height, false);

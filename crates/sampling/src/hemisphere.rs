@@ -30,6 +30,25 @@ impl Frame {
         }
     }
 
+    /// A frame around the unit vector `normal` that turns with it: no jump as long as the axis nearest to the normal is the same.
+    #[inline]
+    pub fn steady(normal: Vec3) -> Self {
+        let a = normal.abs();
+        let across = if a.x >= a.y && a.x >= a.z {
+            Vec3::Y
+        } else if a.y >= a.z {
+            Vec3::Z
+        } else {
+            Vec3::X
+        };
+        let tangent = (across - normal * normal.dot(across)).normalize();
+        Self {
+            tangent,
+            bitangent: normal.cross(tangent),
+            normal,
+        }
+    }
+
     /// From local coordinates to those of the normal.
     #[inline]
     pub fn to_world(&self, local: Vec3) -> Vec3 {

@@ -11,6 +11,7 @@ pub mod discrepancy;
 pub mod discrete;
 pub mod estimators;
 pub mod ggx;
+pub mod guide;
 pub mod hash;
 pub mod hemisphere;
 pub mod integrands;
@@ -26,6 +27,7 @@ pub mod sum;
 pub mod triangle;
 
 pub use discrete::{Discrete, Draw};
+pub use guide::HemisphereGuide;
 pub use hemisphere::Frame;
 pub use pixel::PixelSampler;
 pub use random::{Random, Stream, unit_f32, unit_f64};

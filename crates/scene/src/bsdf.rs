@@ -4,6 +4,7 @@ pub(crate) mod albedo;
 
 use albedo::SpecularAlbedo;
 use glam::{Vec2, Vec3};
+use sampling::HemisphereGuide;
 use sampling::hemisphere::{Frame, cosine_hemisphere};
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -47,6 +48,8 @@ pub struct BsdfSample {
     pub value: Vec3,
     /// Density with respect to solid angle.
     pub pdf_solid_angle: f32,
+    /// What the density would be without a guide.
+    pub pdf_unguided: f32,
 }
 
 impl Bsdf {
@@ -71,31 +74,60 @@ impl Bsdf {
     /// [`Bsdf::eval`] and [`Bsdf::pdf`] together, which share most of their work.
     #[inline]
     pub fn eval_pdf(&self, wo_ws: Vec3, wi_ws: Vec3) -> (Vec3, f32) {
+        self.eval_pdf_guided(wo_ws, wi_ws, None)
+    }
+
+    /// The same if the diffuse lobe is drawn as `guide` says.
+    #[inline]
+    pub fn eval_pdf_guided(&self, wo_ws: Vec3, wi_ws: Vec3, guide: Option<&HemisphereGuide>) -> (Vec3, f32) {
         let cos_i = self.normal_ws.dot(wi_ws);
         if cos_i <= 0.0 {
             return (Vec3::ZERO, 0.0);
         }
         let lambert = cos_i * FRAC_1_PI;
+        let factor = guide.map_or(1.0, |guide| guide.density(self.normal_ws, wi_ws));
         if self.is_lambert() {
-            return (self.diffuse * lambert, lambert);
+            return (self.diffuse * lambert, lambert * factor);
         }
-        self.layered(wo_ws, wi_ws, cos_i)
+        let (value, pdf) = self.layered(wo_ws, wi_ws, cos_i);
+        (value, pdf.specular + pdf.diffuse * factor)
     }
 
     /// Draws a direction. `u_lobe` in \[0, 1) chooses the lobe, `u` the direction. `None`: absorbed.
     #[inline]
     pub fn sample(&self, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let frame = Frame::new(self.normal_ws);
-        if self.is_lambert() {
-            let local = cosine_hemisphere(u);
-            let lambert = local.z * FRAC_1_PI;
-            return Some(BsdfSample {
-                wi_ws: frame.to_world(local),
-                value: self.diffuse * lambert,
-                pdf_solid_angle: lambert,
-            });
+        self.sample_guided(wo_ws, u_lobe, u, None)
+    }
+
+    /// The same with the diffuse lobe drawn as `guide` says.
+    #[inline]
+    pub fn sample_guided(
+        &self,
+        wo_ws: Vec3,
+        u_lobe: f32,
+        u: Vec2,
+        guide: Option<&HemisphereGuide>,
+    ) -> Option<BsdfSample> {
+        if !self.is_lambert() {
+            return self.sample_layered(wo_ws, u_lobe, u, guide);
         }
-        self.sample_layered(&frame, wo_ws, u_lobe, u)
+        let (wi_ws, lambert, factor) = match guide {
+            Some(guide) => {
+                let (wi_ws, factor) = guide.sample(self.normal_ws, u);
+                (wi_ws, self.normal_ws.dot(wi_ws) * FRAC_1_PI, factor)
+            }
+            None => {
+                let local = cosine_hemisphere(u);
+                (Frame::new(self.normal_ws).to_world(local), local.z * FRAC_1_PI, 1.0)
+            }
+        };
+        // Rounding can put a guided direction on the horizon.
+        (lambert > 0.0).then(|| BsdfSample {
+            wi_ws,
+            value: self.diffuse * lambert,
+            pdf_solid_angle: lambert * factor,
+            pdf_unguided: lambert,
+        })
     }
 
     /// Schlick's approximation.
@@ -123,12 +155,13 @@ impl Bsdf {
         (specular / (specular + diffuse)).clamp(0.1, 0.9)
     }
 
-    fn layered(&self, wo_ws: Vec3, wi_ws: Vec3, cos_i: f32) -> (Vec3, f32) {
+    /// Value and density of both lobes; `cos_i` is above 0.
+    fn layered(&self, wo_ws: Vec3, wi_ws: Vec3, cos_i: f32) -> (Vec3, LobePdfs) {
         let cos_o = self.normal_ws.dot(wo_ws);
         let half = wo_ws + wi_ws;
         let half_length_sq = half.length_squared();
         if cos_o <= 0.0 || half_length_sq <= 0.0 {
-            return (Vec3::ZERO, 0.0);
+            return (Vec3::ZERO, LobePdfs::default());
         }
         let half = half / half_length_sq.sqrt();
         let alpha_sq = self.alpha * self.alpha;
@@ -146,7 +179,10 @@ impl Bsdf {
         let albedo = self.specular_albedo();
         let albedo_o = albedo.at(cos_o);
         let probability = self.specular_probability(albedo_o);
-        let pdf = probability * pdf_specular + (1.0 - probability) * lambert;
+        let pdf = LobePdfs {
+            specular: probability * pdf_specular,
+            diffuse: (1.0 - probability) * lambert,
+        };
         let (passing_o, passing_i, mean) = (1.0 - albedo_o, 1.0 - albedo.at(cos_i), 1.0 - albedo.mean());
         // A mirror lets nothing pass: no share of nothing.
         let coupling = if mean > 1e-6 {
@@ -158,24 +194,41 @@ impl Bsdf {
         (specular + diffuse, pdf)
     }
 
-    fn sample_layered(&self, frame: &Frame, wo_ws: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+    fn sample_layered(&self, wo_ws: Vec3, u_lobe: f32, u: Vec2, guide: Option<&HemisphereGuide>) -> Option<BsdfSample> {
+        let frame = Frame::new(self.normal_ws);
         let cos_o = self.normal_ws.dot(wo_ws);
         let wi_ws = if u_lobe < self.specular_probability(self.specular_albedo().at(cos_o)) {
             let wo = frame.to_local(wo_ws);
             let half = sampling::ggx::sample_vndf(wo, self.alpha, u);
             frame.to_world(half * (2.0 * wo.dot(half)) - wo).normalize()
+        } else if let Some(guide) = guide {
+            guide.sample(self.normal_ws, u).0
         } else {
             frame.to_world(cosine_hemisphere(u))
         };
-        let (value, pdf_solid_angle) = self.eval_pdf(wo_ws, wi_ws);
+        let cos_i = self.normal_ws.dot(wi_ws);
+        if cos_i <= 0.0 {
+            return None;
+        }
+        let (value, pdf) = self.layered(wo_ws, wi_ws, cos_i);
+        let factor = guide.map_or(1.0, |guide| guide.density(self.normal_ws, wi_ws));
+        let pdf_solid_angle = pdf.specular + pdf.diffuse * factor;
         // False for NaN.
         let usable = pdf_solid_angle > 0.0 && pdf_solid_angle < f32::INFINITY && value.is_finite();
         usable.then_some(BsdfSample {
             wi_ws,
             value,
             pdf_solid_angle,
+            pdf_unguided: pdf.specular + pdf.diffuse,
         })
     }
+}
+
+/// Densities with respect to solid angle, times the probability of the lobe.
+#[derive(Clone, Copy, Default)]
+struct LobePdfs {
+    specular: f32,
+    diffuse: f32,
 }
 
 #[cfg(test)]

@@ -118,6 +118,11 @@ pub(crate) struct LightArgs {
     /// With it there is less noise, and pixels may come out below zero; without there is less work at every point.
     #[arg(long)]
     pub(crate) no_control_variate: bool,
+    /// `adaptive`: bounces leave as the surface reflects, whatever earlier ones found
+    ///
+    /// Guided, paths go more often to where light was found, on the CPU; without there is no memory for directions.
+    #[arg(long)]
+    pub(crate) no_guided_bounces: bool,
     /// `oracle`: times that it looks at all lights from every pixel before it starts
     ///
     /// Higher values come closer to the best choice; lower values are prepared sooner.
@@ -232,6 +237,7 @@ impl LightArgs {
             light: light_cache::Settings {
                 min_probability_mass: self.min_probability_mass,
                 control_variate: !self.no_control_variate,
+                guided_bounces: !self.no_guided_bounces,
                 ignore_below: self.ignore_below,
                 ..Default::default()
             },

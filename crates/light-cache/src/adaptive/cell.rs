@@ -6,6 +6,7 @@
 //! finished by the light tree's own descent at the point.
 
 use super::branch::Branch;
+use super::directions::Directions;
 use super::emitter::Emitter;
 use super::palette::Palette;
 use super::subcells::{Count, Cube, SubCells};
@@ -14,6 +15,7 @@ use crate::Observation;
 use crate::state::is_amount;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
 use glam::Vec3;
+use sampling::HemisphereGuide;
 
 /// Most entries of a cut. Higher values resolve more lights one by one; lower values learn faster and cost less.
 pub(super) const MAX_ENTRIES: usize = 96;
@@ -135,6 +137,15 @@ pub(super) struct Lights<'l> {
     pub(super) palette: Option<&'l Palette>,
 }
 
+/// Whether there may be more of what is kept within cells.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct MayGrow {
+    /// [`SubCells`]
+    pub(super) cubes: bool,
+    /// [`Directions`]
+    pub(super) places: bool,
+}
+
 /// A cell of the grid.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Cell {
@@ -150,6 +161,8 @@ pub(super) struct Cell {
     weights: Weights,
     /// Where in the cell which entry was visible.
     subcells: SubCells,
+    /// Where paths go on that leave from here; `None` if none did.
+    directions: Option<Box<Directions>>,
     /// Observations so far, and when the weights were last made.
     pub(super) seen: f32,
     built_at: f32,
@@ -170,6 +183,7 @@ impl Cell {
             firsts: Vec::new(),
             weights: Weights::default(),
             subcells: SubCells::new(lights.palette.is_some()),
+            directions: None,
             seen: 0.0,
             built_at: 0.0,
             refined_at: 0.0,
@@ -249,6 +263,7 @@ impl Cell {
     pub(super) fn around(&self, cube: Cube) -> Nearby<'_> {
         Nearby {
             cell: self,
+            cube,
             factors: self.subcells.factors(cube),
         }
     }
@@ -258,12 +273,16 @@ impl Cell {
         &mut self,
         lights: Lights<'_>,
         unit: f32,
-        may_grow: bool,
+        may_grow: MayGrow,
         observations: impl Iterator<Item = &'o (&'o Observation, Cube)>,
     ) {
         let tree = lights.tree;
         for &(o, cube) in observations {
             let times = o.weight as f32;
+            if let Some(bounce) = o.bounce {
+                let directions = self.directions.get_or_insert_with(|| Box::new(Directions::new()));
+                directions.observe(cube, bounce, times, may_grow.places);
+            }
             let place = tree.rank[o.light as usize];
             let j = self.entry_of(place);
             let receiver = Receiver::from(&o.point);
@@ -276,9 +295,12 @@ impl Cell {
                 let ratio = o.irradiance / (within * unit * estimate);
                 self.entries[j].observe(ratio, o.visible, self.total / estimate, times);
                 self.subcells
-                    .observe(cube, j, Count::of(o), self.entries.len(), may_grow);
+                    .observe(cube, j, Count::of(o), self.entries.len(), may_grow.cubes);
             }
             self.seen += times;
+        }
+        if let Some(directions) = &mut self.directions {
+            directions.refresh();
         }
         if self.seen >= 2.0 * self.refined_at.max(8.0) {
             let old: Vec<Branch> = self.branches().collect();
@@ -315,6 +337,11 @@ impl Cell {
         self.subcells.len()
     }
 
+    /// From how many of its places paths have gone on.
+    pub(super) fn places(&self) -> usize {
+        self.directions.as_ref().map_or(0, |directions| directions.len())
+    }
+
     fn branches(&self) -> impl ExactSizeIterator<Item = Branch> {
         self.entries.iter().map(|entry| entry.branch)
     }
@@ -347,6 +374,7 @@ impl Cell {
             && self.firsts.iter().copied().eq(self.entries.iter().map(firsts))
             && self.weights.is_sound(self.branches(), lights.palette.is_some())
             && self.subcells.is_sound(self.entries.len(), lights.palette.is_some())
+            && self.directions.as_ref().is_none_or(|directions| directions.is_sound())
             && [self.seen, self.built_at, self.refined_at, self.total]
                 .into_iter()
                 .all(is_amount)
@@ -359,6 +387,7 @@ impl Cell {
             + self.firsts.capacity() * size_of::<u32>()
             + self.weights.bytes()
             + self.subcells.bytes()
+            + self.directions.as_ref().map_or(0, |directions| directions.bytes())
             + self.probes.capacity() * size_of::<Receiver>()
     }
 
@@ -436,15 +465,22 @@ impl Cell {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Nearby<'c> {
     cell: &'c Cell,
+    cube: Cube,
     factors: Factors<'c>,
 }
 
-impl Nearby<'_> {
+impl<'c> Nearby<'c> {
     /// The entry at position `x` of an interval of `width` (at most 2^52), as it is cut at a point; `None` if nothing
     /// arrives there.
     #[inline]
     pub(super) fn draw(&self, receiver: &Receiver, x: u64, width: u64) -> Option<Part> {
         self.find(receiver, Wanted::At(x), width)
+    }
+
+    /// Where paths go on that leave from here, if that is known.
+    #[inline]
+    pub(super) fn guide(&self) -> Option<&'c HemisphereGuide> {
+        self.cell.directions.as_ref()?.guide(self.cube)
     }
 
     /// The same for several positions.

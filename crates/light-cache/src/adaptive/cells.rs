@@ -1,6 +1,6 @@
 //! All cells: which observation belongs to which, and making them.
 
-use super::cell::{Cell, Entry, Lights, Nearby, Origin};
+use super::cell::{Cell, Entry, Lights, MayGrow, Nearby, Origin};
 use super::grid::{Grid, NO_CELL, Spot, dominant_axis};
 use super::subcells::Cube;
 use crate::tree::{Receiver, Tree};
@@ -12,6 +12,9 @@ use rayon::prelude::*;
 const MAX_CELLS: usize = 1 << 14;
 /// No cubes are added when there are more than this in all: they know no more then than their cells.
 const MAX_CUBES: usize = 1 << 17;
+
+/// The same for places that paths go on from.
+const MAX_PLACES: usize = 1 << 15;
 
 /// The cells and the grid that finds them.
 #[derive(Debug, serde::Serialize, serde::Deserialize)]
@@ -177,7 +180,10 @@ impl Cells {
             *next += 1;
         }
         let unit = self.unit;
-        let may_grow = self.cells.iter().map(Cell::cubes).sum::<usize>() < MAX_CUBES;
+        let may_grow = MayGrow {
+            cubes: self.cells.iter().map(Cell::cubes).sum::<usize>() < MAX_CUBES,
+            places: self.cells.iter().map(Cell::places).sum::<usize>() < MAX_PLACES,
+        };
         let by_cell = &by_cell;
         self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
             let range = starts[i] as usize..starts[i + 1] as usize;

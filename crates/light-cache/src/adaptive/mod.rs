@@ -19,6 +19,7 @@ mod branch;
 mod cell;
 mod cells;
 mod cut;
+mod directions;
 mod emitter;
 mod grid;
 mod packed;
@@ -37,6 +38,7 @@ use cell::{Lights, Nearby};
 use cells::Cells;
 use glam::Vec3;
 use palette::Palette;
+use sampling::HemisphereGuide;
 use scene::Scene;
 use std::time::Instant;
 use weights::{Part, Wanted};
@@ -243,6 +245,18 @@ impl LightSampler for AdaptiveSampler {
         self.chosen(local, light).map_or(0.0, |choice| choice.pmf)
     }
 
+    fn guides(&self) -> bool {
+        self.settings.guided_bounces
+    }
+
+    #[inline]
+    fn guide<'a>(&'a self, local: &Local<'a>) -> Option<&'a HemisphereGuide> {
+        match &local.source {
+            Source::Cell(cell) => cell.guide(),
+            Source::Tree(_) | Source::Nothing => None,
+        }
+    }
+
     fn end_frame(&mut self, _scene: &Scene, logs: &[Vec<Observation>]) {
         let start = Instant::now();
         self.frames += 1;
@@ -396,8 +410,12 @@ impl AdaptiveSampler {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::testing::{check, check_each_light_is_drawn, check_saving, mixed_lights, observe, points, scene_of};
+    use crate::testing::{
+        LIT_PART, check, check_each_light_is_drawn, check_saving, mixed_lights, observe, points, scene_of,
+    };
     use glam::DVec3;
+    use sampling::Random;
+    use sampling::guide::{PARTS, part_of};
 
     fn learned(scene: &Scene, frames: u32, visible: impl Fn(u32) -> bool) -> AdaptiveSampler {
         let mut sampler = AdaptiveSampler::new(scene, &Settings::default());
@@ -506,6 +524,34 @@ mod tests {
                 .sample(&local, i << 26)
                 .is_none_or(|choice| choice.control == Vec3::ZERO)
         }));
+    }
+
+    #[test]
+    fn paths_go_on_to_where_light_was_found() {
+        let scene = scene_of(mixed_lights(100, 3));
+        let point = points(1, 9)[0];
+        let mut sampler = AdaptiveSampler::new(&scene, &Settings::default());
+        let lit = |sampler: &AdaptiveSampler| {
+            let local = sampler.local(&scene, &point);
+            let guide = sampler.guide(&local)?;
+            let random = Random::new(3, 0, 0);
+            let draws = (0..256).map(|i| guide.sample(point.normal_ws, random.vec2(2 * i)).0);
+            let lit = draws.filter(|direction| part_of(point.normal_ws, *direction) == usize::from(LIT_PART));
+            Some(lit.count() as f32 / 256.0)
+        };
+        assert_eq!(lit(&sampler), None);
+        for frame in 0..4 {
+            let mut logs = observe(&sampler, &scene, frame, |_| true);
+            logs.iter_mut().flatten().for_each(|o| o.point = point);
+            sampler.end_frame(&scene, &logs);
+        }
+        let share = lit(&sampler).expect("enough was seen");
+        assert!(share > 5.0 / PARTS as f32, "{share}");
+        let unguided = Settings {
+            guided_bounces: false,
+            ..Settings::default()
+        };
+        assert!(!AdaptiveSampler::new(&scene, &unguided).guides());
     }
 
     #[test]

@@ -40,7 +40,7 @@ impl Cube {
 
     /// Which cube of a layer that is in, if the layer has 2^`bits` along an edge.
     #[inline]
-    fn within(self, bits: u32) -> usize {
+    pub(super) fn within(self, bits: u32) -> usize {
         let [x, y, z] = self.0.map(|c| usize::from(c >> (LEVELS - bits)));
         x | y << bits | z << (2 * bits)
     }

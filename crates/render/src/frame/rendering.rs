@@ -3,6 +3,7 @@
 use super::state::{self, State};
 use super::{FrameLoop, RenderStats, SceneRef};
 use crate::choosing::Choosing;
+use crate::direct::DirectLight;
 use crate::filter::FilterSampler;
 use crate::gpu::PassTime;
 use crate::path::{Counters, FrameView};
@@ -38,7 +39,7 @@ pub(crate) struct Eye<'s> {
 }
 
 impl Eye<'_> {
-    pub(crate) fn view<'f, D>(&'f self, direct: &'f D) -> FrameView<'f, D> {
+    pub(crate) fn view<'f, D: DirectLight>(&'f self, direct: &'f D) -> FrameView<'f, D> {
         FrameView {
             scene: &self.scene,
             direct,
@@ -53,6 +54,7 @@ impl Eye<'_> {
             light_samples: self.light_samples,
             candidates: self.candidates,
             area_lights: self.area_lights,
+            guided: self.max_bounces > 0 && direct.guides(),
         }
     }
 }

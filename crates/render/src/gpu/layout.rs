@@ -127,6 +127,7 @@ impl PackedObservation {
             pmf: self.pmf,
             visible: self.flags & Self::VISIBLE != 0,
             weight: self.weight,
+            bounce: None,
         })
     }
 }

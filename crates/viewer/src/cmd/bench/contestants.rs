@@ -20,6 +20,8 @@ pub(super) enum Knob {
     LightSamples,
     /// with samples where the error is, as with `render --target-error`, and with one per pixel and frame
     AdaptivePixels,
+    /// with directions that `adaptive` has learned for paths to go on in, and without
+    GuidedBounces,
     /// with the control variate of `adaptive`, and without
     ControlVariate,
 }
@@ -112,6 +114,9 @@ impl Knob {
                 .into(),
             Self::AdaptivePixels => [("adaptive pixels", true), ("even pixels", false)]
                 .map(|(name, on)| with(name, &|s| s.adaptive_pixels = on))
+                .into(),
+            Self::GuidedBounces => [("guided", true), ("unguided", false)]
+                .map(|(name, on)| with(name, &|s| s.light.guided_bounces = on))
                 .into(),
             Self::ControlVariate => [("on", true), ("off", false)]
                 .map(|(name, on)| with(name, &|s| s.light.control_variate = on))

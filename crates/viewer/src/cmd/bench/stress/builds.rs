@@ -57,6 +57,11 @@ fn gpu(bench: &mut Bench) -> Result<()> {
             height: 36,
             method: Method::Sampled(kind),
             max_bounces: 1,
+            light: light_cache::Settings {
+                // The GPU does not guide.
+                guided_bounces: false,
+                ..Default::default()
+            },
             ..Settings::default()
         };
         let of_cpu = picture(render::renderer(&scene, &camera, &settings)?.as_mut());

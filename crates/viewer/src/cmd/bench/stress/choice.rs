@@ -254,6 +254,7 @@ impl Judge<'_> {
                 pmf: choice.pmf,
                 visible: choice.light.is_multiple_of(3),
                 weight: 1,
+                bounce: None,
             })
         });
         vec![log.collect()]

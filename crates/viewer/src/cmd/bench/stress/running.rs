@@ -176,6 +176,7 @@ impl Walk<'_> {
             pmf: 0.01 + 0.99 * random.f32(4),
             visible: !random.u32(5).is_multiple_of(3),
             weight: 1,
+            bounce: None,
         }
     }
 }
