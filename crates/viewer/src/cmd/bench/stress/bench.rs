@@ -102,9 +102,9 @@ impl<'w> Bench<'w> {
         self.report.now(&format!("{}: {what}", self.family))
     }
 
-    /// Says why something is not checked.
-    pub(super) fn skip(&self, why: impl Display) {
-        self.report.line(&format!("SKIPPED: {why}"));
+    /// Says something about the checks to come, such as why they are not made.
+    pub(super) fn note(&self, text: impl Display) {
+        self.report.line(&text.to_string());
     }
 
     /// All that was found.
@@ -260,9 +260,15 @@ impl Estimate {
         deviation(self.mean.mean() - other.mean.mean(), error, other.mean.mean())
     }
 
-    /// Mean over the pixels of the variance of a repetition, over the square of the mean luminance.
+    /// Mean over the pixels of the variance of a repetition, over the square of the mean luminance; without the pixels of the largest
+    /// variances, a thirtieth of all. Where a few spikes decide the mean over all pixels, it is no property of the sampler: of `table` on
+    /// `points` it differed by a factor of 1.7 between the seeds 0 and 1000 at the same place, on `rooms` by 1.4, and without these pixels
+    /// by 1.1 and 1.06.
     pub(super) fn relative_variance(&self) -> f64 {
-        let variance = self.pixels.iter().map(Moments::variance).sum::<f64>() / self.pixels.len() as f64;
+        let mut variances: Vec<f64> = self.pixels.iter().map(Moments::variance).collect();
+        variances.sort_unstable_by(f64::total_cmp);
+        variances.truncate(variances.len() - variances.len() / 30);
+        let variance = variances.iter().sum::<f64>() / variances.len() as f64;
         variance / self.mean.mean().powi(2)
     }
 }

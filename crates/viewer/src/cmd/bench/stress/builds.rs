@@ -21,14 +21,14 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
     if bench.pick(false, true, true) {
         gpu(bench)?;
     } else {
-        bench.skip(
-            "the GPU is compared with the CPU at more effort only: software drivers compile its programs for minutes",
+        bench.note(
+            "SKIPPED: the GPU is compared with the CPU at more effort only: software drivers compile its programs for minutes",
         );
     }
     match bench.other_program().map(Path::to_path_buf) {
         Some(program) => other(bench, &program),
         None => {
-            bench.skip("no other build to compare with; give one with --other-build");
+            bench.note("SKIPPED: no other build to compare with; give one with --other-build");
             Ok(())
         }
     }
@@ -39,11 +39,12 @@ fn gpu(bench: &mut Bench) -> Result<()> {
     let gpu = match Gpu::open() {
         Ok(gpu) => gpu,
         Err(error) => {
-            bench.skip(format_args!("the GPU is not compared with the CPU: {error}"));
+            bench.note(format_args!("SKIPPED: the GPU is not compared with the CPU: {error}"));
             return Ok(());
         }
     };
-    let states = states()?;
+    let states = states(bench.pick(false, false, true))?;
+    bench.note(format_args!("GPU: {}", gpu.info()));
     for kind in render::gpu::SAMPLERS {
         bench.now(format_args!("GPU against CPU, {}", kind.name()))?;
         let settings = Settings {
@@ -64,7 +65,7 @@ fn gpu(bench: &mut Bench) -> Result<()> {
                 Ok(picture(frames.as_mut()))
             });
             let (of_cpu, of_gpu) = (of_cpu?, of_gpu?);
-            let hazard = format!("GPU ({}) against CPU{name}", gpu.info().name);
+            let hazard = format!("GPU against CPU, {name}");
             let broken = of_gpu.pixels.as_flattened().iter().filter(|x| !x.is_finite()).count();
             let broken = broken as u64 + on_gpu.stats().nonfinite_samples;
             bench.check(&hazard, kind.name(), NEVER, broken as f64);
@@ -74,25 +75,28 @@ fn gpu(bench: &mut Bench) -> Result<()> {
     Ok(())
 }
 
-/// Hazards for which no shader has to be compiled anew: one scene, lit, scaled and moved in other ways, its camera with it.
-fn states() -> Result<Vec<(&'static str, Scene, Camera)>> {
+/// One scene, lit in other ways; and `placed` otherwise, for which software drivers compile the shaders anew.
+fn states(placed: bool) -> Result<Vec<(&'static str, Scene, Camera)>> {
     let (parts, camera) = still_life(square_lamp);
     let scene = Scene::new(parts.clone())?;
-    let mut states = vec![("", scene.clone(), camera.clone())];
+    let mut states = vec![("as it is", scene.clone(), camera.clone())];
     for (name, of_one, of_others) in [
-        (", all light times 2^90", 2_f32.powi(90), 2_f32.powi(90)),
-        (", all light times 2^-90", 2_f32.powi(-90), 2_f32.powi(-90)),
-        (", one light 1e20 times as strong", 1e20, 1.0),
-        (", all lights put out", 0.0, 0.0),
+        ("all light times 2^90", 2_f32.powi(90), 2_f32.powi(90)),
+        ("all light times 2^-90", 2_f32.powi(-90), 2_f32.powi(-90)),
+        ("one light 1e20 times as strong", 1e20, 1.0),
+        ("all lights put out", 0.0, 0.0),
     ] {
         let factors = (0..scene.lights.len() as u32).map(|light| (light, if light == 0 { of_one } else { of_others }));
         let factors: Vec<(u32, Vec3)> = factors.map(|(light, factor)| (light, Vec3::splat(factor))).collect();
         states.push((name, scene.relit(&factors), camera.clone()));
     }
+    if !placed {
+        return Ok(states);
+    }
     for (name, scale, offset) in [
-        (", times 1e-4", 1e-4, DVec3::ZERO),
-        (", times 1e5", 1e5, DVec3::ZERO),
-        (", 1e5 m from the origin", 1.0, DVec3::new(1e5, 0.0, 1e5)),
+        ("times 1e-4", 1e-4, DVec3::ZERO),
+        ("times 1e5", 1e5, DVec3::ZERO),
+        ("1e5 m from the origin", 1.0, DVec3::new(1e5, 0.0, 1e5)),
     ] {
         let placed = Scene::new(transformed(parts.clone(), scale, offset))?;
         states.push((name, placed, transformed_camera(&camera, scale, offset)));

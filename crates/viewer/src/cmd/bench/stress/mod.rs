@@ -39,7 +39,12 @@ const FAMILIES: [Family; 10] = [
     ("builds", builds::check),
 ];
 
-/// Checks all hazards.
+/// The names of the families.
+pub(super) fn families() -> [&'static str; FAMILIES.len()] {
+    FAMILIES.map(|(name, _)| name)
+}
+
+/// Checks all hazards, or those of the families that are asked for.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -47,9 +52,12 @@ pub(super) fn run(args: &BenchArgs, effort: Effort) -> Result<Status> {
     super::make_output(&args.output, "stress.json")?;
     session::use_threads(args.light.threads)?;
     let watch = Watch::rendering();
-    let report = Report::new(args.output.join("stress.json"));
+    let asked = |name: &str| args.families.is_empty() || args.families.iter().any(|family| family == name);
+    let families: Vec<Family> = FAMILIES.into_iter().filter(|(name, _)| asked(name)).collect();
+    let names = families.iter().map(|(name, _)| *name).collect();
+    let report = Report::new(args.output.join("stress.json"), names);
     let mut bench = Bench::new(effort, &watch, args.other_build.as_deref(), report);
-    let checked = FAMILIES.into_iter().try_for_each(|(family, check)| {
+    let checked = families.into_iter().try_for_each(|(family, check)| {
         bench.begin(family);
         check(&mut bench)
     });

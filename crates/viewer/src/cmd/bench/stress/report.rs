@@ -15,6 +15,7 @@ const BETWEEN_SAVES: Duration = Duration::from_secs(1);
 /// All checks, and the file that they are kept in.
 pub(super) struct Report {
     path: PathBuf,
+    families: Vec<&'static str>,
     machine: Machine,
     spinner: Spinner,
     checks: Vec<Check>,
@@ -22,10 +23,11 @@ pub(super) struct Report {
 }
 
 impl Report {
-    /// None checked yet; they will be written to `path`.
-    pub(super) fn new(path: PathBuf) -> Self {
+    /// No check of `families` made yet; they will be written to `path`.
+    pub(super) fn new(path: PathBuf, families: Vec<&'static str>) -> Self {
         Self {
             path,
+            families,
             machine: Machine::detect(),
             spinner: Spinner::new(),
             checks: Vec::new(),
@@ -77,7 +79,8 @@ impl Report {
         struct Document<'a> {
             version: &'static str,
             machine: &'a Machine,
-            /// Whether all families were checked to their ends.
+            families: &'a [&'static str],
+            /// Whether these were checked to their ends.
             complete: bool,
             passed: bool,
             checks: &'a [Check],
@@ -85,6 +88,7 @@ impl Report {
         let document = Document {
             version: crate::machine::VERSION,
             machine: &self.machine,
+            families: &self.families,
             complete,
             passed: self.passed(),
             // A deviation that is infinite or no number is null.

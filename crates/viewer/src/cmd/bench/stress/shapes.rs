@@ -133,8 +133,12 @@ fn points_and_densities(bench: &mut Bench) -> Result<()> {
             broken += u32::from(!finite || point.pdf_solid_angle <= 0.0 || point.distance <= 0.0);
             let at = point.wi_ws.as_dvec3() * f64::from(point.distance);
             let extent = corners[0].distance(corners[1]).max(corners[0].distance(corners[2]));
-            // A direction and a distance in single precision cannot name a point better.
-            let tolerance = 1e-3 * f64::from(extent) + 1e-6 * at.length();
+            // A direction and a distance in single precision cannot name a point better: where the light is seen edge-on, 1e-6 rad reach far
+            // along it. Of a triangle that spans nearly half of all directions, an edge spans nearly half a turn: the cosine of the angle along
+            // it, by which its points are drawn, is nearly -1, and has no more than 1e-4 rad left.
+            let vast = point.pdf_solid_angle < 1.0 / 6.0;
+            let cosine = at.normalize().dot(normal(corners)).abs();
+            let tolerance = 1e-3 * f64::from(extent) + if vast { 1e-4 } else { 1e-6 } * at.length() / cosine;
             off += u32::from(beyond(corners, at) > tolerance);
             let again = light.pdf_solid_angle(Vec3::ZERO, point.wi_ws, point.distance);
             unlike += u32::from((again / point.pdf_solid_angle - 1.0).abs() > 1e-3);
@@ -159,12 +163,17 @@ fn points_and_densities(bench: &mut Bench) -> Result<()> {
 }
 
 /// How far `at`, on its plane or nearly so, lies outside of the triangle, metres; 0 inside.
-fn beyond([a, b, c]: [Vec3; 3], at: DVec3) -> f64 {
-    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
-    let normal = (b - a).cross(c - a).normalize_or_zero();
+fn beyond(corners: [Vec3; 3], at: DVec3) -> f64 {
+    let normal = normal(corners);
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
     let inside = |p: DVec3, q: DVec3| (q - p).cross(at - p).dot(normal) / p.distance(q);
     let least = inside(a, b).min(inside(b, c)).min(inside(c, a));
     (-least).max(0.0).max((at - a).dot(normal).abs())
+}
+
+fn normal(corners: [Vec3; 3]) -> DVec3 {
+    let [a, b, c] = corners.map(Vec3::as_dvec3);
+    (b - a).cross(c - a).normalize_or_zero()
 }
 
 /// A scene of one small light above a floor of albedo 1, and the radiance of the point below it.
