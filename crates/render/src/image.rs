@@ -8,7 +8,7 @@ use exr::prelude::{
 use glam::Vec3;
 use image::ImageEncoder;
 use scene::luminance;
-use std::io::{BufReader, Cursor};
+use std::io::{BufReader, Cursor, Seek};
 use std::path::Path;
 
 pub(crate) mod display;
@@ -99,6 +99,17 @@ pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
         reason,
     };
     let file = std::fs::File::open(path).map_err(|e| error(e.to_string()))?;
+    let len = file.metadata().map_err(|e| error(e.to_string()))?.len();
+    let mut file = BufReader::new(file);
+    let head = exr::meta::MetaData::read_from_buffered(&mut file, false)
+        .map_err(|e| error(format!("not a readable EXR: {e}")))?;
+    let claimed = head.headers.iter().map(unpacked_bytes).sum::<u128>();
+    if claimed > most_bytes(len) {
+        return Err(error(format!(
+            "claims {claimed} bytes of samples in a file of {len}; it is damaged: copy or render it again"
+        )));
+    }
+    file.rewind().map_err(|e| error(e.to_string()))?;
     let parts = exr::prelude::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -106,7 +117,7 @@ pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
         .all_layers()
         .all_attributes()
         .non_parallel()
-        .from_buffered(BufReader::new(file))
+        .from_buffered(file)
         .map_err(|e| error(format!("not a readable EXR: {e}")))?;
     for part in &parts.layer_data {
         let channel = |name: &str| part.channel_data.list.iter().find(|c| c.name.eq(name));
@@ -133,6 +144,20 @@ pub fn read_exr(path: &Path) -> Result<Image, RenderError> {
     Err(error(format!(
         "no channels R, G, B and no Y; it has: {names}; export the beauty pass as RGB"
     )))
+}
+
+/// Bytes that the samples of a part take in memory, as its header says. The reader allocates them before it looks for them in the file.
+fn unpacked_bytes(part: &exr::meta::header::Header) -> u128 {
+    let pixels = part.layer_size.width() as u128 * part.layer_size.height() as u128;
+    pixels * part.channels.bytes_per_pixel as u128
+}
+
+/// More bytes of samples than this do not fit into a file of `len` bytes: deflate packs 1032 into one at most, and other methods not much
+/// more of anything but small images of one colour.
+fn most_bytes(len: u64) -> u128 {
+    const SMALL: u128 = 1 << 26;
+    const MOST_PACKED: u128 = 4096;
+    SMALL + MOST_PACKED * u128::from(len)
 }
 
 /// Writes an sRGB PNG of `image` x 2^`exposure` through the display tone curve, see [`scene::file::write`].

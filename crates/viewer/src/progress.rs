@@ -1,9 +1,9 @@
-//! Progress on stderr: a bar on a terminal, a line each 10 % elsewhere, nothing when quiet.
+//! Progress on stderr: a bar on a terminal, a line each 10 % elsewhere, nothing when quiet. Of what nobody knows the end of, the current part.
 
 use crate::{message, table};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// The progress of one job.
 pub(crate) struct Progress {
@@ -13,13 +13,18 @@ pub(crate) struct Progress {
     start: Instant,
 }
 
+/// Whether somebody looks on.
+fn shown() -> bool {
+    !message::quiet() && std::io::stderr().is_terminal()
+}
+
 /// Steps of the bar.
 const STEPS: u64 = 1000;
 
 impl Progress {
     /// Starts to tell about `what`.
     pub(crate) fn new(what: &str) -> Self {
-        let bar = (!message::quiet() && std::io::stderr().is_terminal()).then(|| {
+        let bar = shown().then(|| {
             let bar = ProgressBar::with_draw_target(Some(STEPS), ProgressDrawTarget::stderr_with_hz(10));
             let style = ProgressStyle::with_template("{prefix} [{bar:30}] {percent:>3} %  {msg}  {elapsed} left {eta}");
             bar.set_style(
@@ -59,6 +64,48 @@ impl Progress {
 }
 
 impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// What is being done just now, in the last line of a terminal; above it, or alone elsewhere, lines that stay.
+pub(crate) struct Spinner {
+    bar: Option<ProgressBar>,
+}
+
+impl Spinner {
+    /// Nothing yet.
+    pub(crate) fn new() -> Self {
+        let bar = shown().then(|| {
+            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr_with_hz(10));
+            let style = ProgressStyle::with_template("{spinner} {elapsed}  {wide_msg}");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        });
+        Self { bar }
+    }
+
+    /// This begins.
+    pub(crate) fn now(&self, what: &str) {
+        if let Some(bar) = &self.bar {
+            bar.set_message(what.to_string());
+        }
+    }
+
+    /// This is known, and stays to be read.
+    pub(crate) fn line(&self, text: &str) {
+        match &self.bar {
+            Some(bar) => bar.println(text),
+            None => message::note(text),
+        }
+    }
+}
+
+impl Drop for Spinner {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

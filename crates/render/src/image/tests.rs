@@ -109,6 +109,31 @@ fn unreadable_files_are_errors_that_name_them() {
     assert!(read_exr(folder.path()).is_err());
 }
 
+/// The reader of EXR files allocates what the header claims: 200 TB ended the program.
+#[test]
+fn sizes_that_cannot_be_are_refused() {
+    let folder = folder();
+    let path = folder.path().join("vast.exr");
+    write_exr(&path, 4, 4, &Channel::rgb("", &gradient(4, 4)), &[]).expect("writable");
+    let mut bytes = std::fs::read(&path).expect("readable");
+    let name = b"dataWindow\0box2i\0";
+    let at = bytes
+        .windows(name.len())
+        .position(|window| window == name)
+        .expect("required");
+    // Its length and the lower corner come first.
+    let upper = at + name.len() + 4 + 8;
+    for (size, known) in [(3_i32, true), (30_000, false), (10_000_000, false)] {
+        bytes[upper..upper + 4].copy_from_slice(&size.to_le_bytes());
+        bytes[upper + 4..upper + 8].copy_from_slice(&size.to_le_bytes());
+        std::fs::write(&path, &bytes).expect("writable");
+        match read_exr(&path) {
+            Ok(image) => assert!(known && image.width == 4),
+            Err(error) => assert!(!known && error.to_string().contains("vast.exr"), "{error}"),
+        }
+    }
+}
+
 #[test]
 fn a_failed_write_leaves_nothing_behind() {
     let folder = folder();

@@ -1,14 +1,19 @@
 //! The file and what lies beside it: container, JSON, buffers, data URIs. The binary chunk of a large file stays on the disk.
 
+mod container;
+mod files;
+mod uri;
+
 use super::json::{self, Index, Root, View};
 use crate::SceneError;
+use container::{Buffer, Opened, split};
+pub(super) use files::{Seen, invalid};
+use files::{open_file, read_file, unreadable, wanted};
 use std::borrow::Cow;
-use std::fs::{File, Metadata};
-use std::io::{self, Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
-use std::time::SystemTime;
+use uri::{decode_base64, decode_percent};
 
 /// A glTF file with its JSON parsed and its buffers read.
 #[derive(Debug)]
@@ -23,109 +28,6 @@ pub(super) struct Source {
     pub(super) bytes: u64,
     /// All files read so far, as they were then.
     seen: Mutex<Vec<Seen>>,
-}
-
-/// The bytes of a buffer.
-#[derive(Debug)]
-enum Buffer {
-    Memory(Vec<u8>),
-    /// A part of a file, read piece by piece. Not mapped into memory: another program that shortens the file would end this one.
-    Disk {
-        file: Mutex<File>,
-        part: Range<u64>,
-    },
-}
-
-impl Buffer {
-    fn len(&self) -> u64 {
-        match self {
-            Self::Memory(bytes) => bytes.len() as u64,
-            Self::Disk { part, .. } => part.end - part.start,
-        }
-    }
-
-    fn truncate(&mut self, length: u64) {
-        match self {
-            Self::Memory(bytes) => bytes.truncate(length as usize),
-            Self::Disk { part, .. } => part.end = part.end.min(part.start.saturating_add(length)),
-        }
-    }
-
-    /// A part of it, which lies within.
-    fn part(self, range: Range<u64>) -> Self {
-        match self {
-            Self::Memory(mut bytes) => {
-                bytes.truncate(range.end as usize);
-                bytes.drain(..range.start as usize);
-                Self::Memory(bytes)
-            }
-            Self::Disk { file, part } => Self::Disk {
-                file,
-                part: part.start + range.start..part.start + range.end,
-            },
-        }
-    }
-
-    /// Bytes within the buffer.
-    fn range(&self, range: Range<u64>) -> io::Result<Cow<'_, [u8]>> {
-        match self {
-            Self::Memory(bytes) => Ok(bytes[range.start as usize..range.end as usize].into()),
-            Self::Disk { file, part } => {
-                let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut bytes = vec![0; (range.end - range.start) as usize];
-                file.seek(SeekFrom::Start(part.start + range.start))?;
-                file.read_exact(&mut bytes)?;
-                Ok(bytes.into())
-            }
-        }
-    }
-}
-
-/// A file as it was when it was read.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Seen {
-    path: PathBuf,
-    len: u64,
-    /// Where the system tells.
-    modified: Option<SystemTime>,
-}
-
-impl Seen {
-    fn new(path: &Path, metadata: &Metadata) -> Self {
-        Self {
-            path: path.into(),
-            len: metadata.len(),
-            modified: metadata.modified().ok(),
-        }
-    }
-
-    /// The bytes of the file, which `scene` wants for `what`.
-    ///
-    /// # Errors
-    /// [`SceneError`] for one that cannot be read, or has changed.
-    pub(super) fn read(&self, scene: &Path, what: &str) -> Result<Vec<u8>, SceneError> {
-        let (bytes, now) = read_file(scene, &self.path, what)?;
-        match now == *self {
-            true => Ok(bytes),
-            false => Err(self.changed(scene)),
-        }
-    }
-
-    fn changed(&self, scene: &Path) -> SceneError {
-        invalid(
-            scene,
-            self.path.display().to_string(),
-            "was changed while the scene was in use",
-            "load it again once it is written",
-        )
-    }
-
-    /// Whether the file is no longer what it was.
-    fn has_changed(&self) -> bool {
-        self.path.metadata().map_or(true, |now| {
-            now.len() != self.len || now.modified().ok() != self.modified
-        })
-    }
 }
 
 impl Source {
@@ -362,211 +264,9 @@ impl Source {
     }
 }
 
-pub(super) fn invalid(
-    path: &Path,
-    place: impl Into<String>,
-    problem: impl Into<String>,
-    remedy: impl Into<String>,
-) -> SceneError {
-    SceneError::Invalid {
-        path: path.into(),
-        place: place.into(),
-        problem: problem.into(),
-        remedy: remedy.into(),
-    }
-}
-
-fn unreadable(path: &Path, source: io::Error) -> SceneError {
-    SceneError::Read {
-        path: path.into(),
-        what: "scene".into(),
-        source,
-    }
-}
-
-/// A file that is open, as it was then.
-struct Opened {
-    buffer: Buffer,
-    seen: Seen,
-}
-
-impl Opened {
-    /// Opens the scene, and reads it if it is not binary, or has `max_whole` bytes at most.
-    fn new(path: &Path, max_whole: u64) -> Result<Self, SceneError> {
-        let (mut file, seen) = open_file(path).map_err(|error| unreadable(path, error))?;
-        let mut read = || {
-            let mut magic = [0; 4];
-            if seen.len > max_whole && file.read_exact(&mut magic).is_ok() && magic == *MAGIC {
-                return Ok(None);
-            }
-            file.rewind()?;
-            let mut bytes = Vec::new();
-            file.read_to_end(&mut bytes).map(|_| Some(bytes))
-        };
-        let buffer = match read().map_err(|error: io::Error| unreadable(path, error))? {
-            Some(bytes) => Buffer::Memory(bytes),
-            None => Buffer::Disk {
-                file: file.into(),
-                part: 0..seen.len,
-            },
-        };
-        Ok(Self { buffer, seen })
-    }
-}
-
-/// Reads `file`, which is wanted as a part of `scene`.
-fn read_file(scene: &Path, file: &Path, what: &str) -> Result<(Vec<u8>, Seen), SceneError> {
-    let read = || {
-        let (mut opened, seen) = open_file(file)?;
-        let mut bytes = Vec::new();
-        opened.read_to_end(&mut bytes)?;
-        Ok((bytes, seen))
-    };
-    read().map_err(|source| wanted(scene, file, what, source))
-}
-
-/// `file`, which is wanted as a part of `scene`, cannot be read.
-fn wanted(scene: &Path, file: &Path, what: &str, source: io::Error) -> SceneError {
-    SceneError::Read {
-        path: file.into(),
-        what: format!("{what} of {}", scene.display()),
-        source,
-    }
-}
-
-/// Opens regular files only: a URI must not make us wait for a pipe or read a device without end.
-fn open_file(file: &Path) -> io::Result<(File, Seen)> {
-    if !std::fs::metadata(file)?.is_file() {
-        return Err(io::Error::other("not a regular file"));
-    }
-    // Of the file that is opened, which may be another by now.
-    let opened = File::open(file)?;
-    let seen = Seen::new(file, &opened.metadata()?);
-    Ok((opened, seen))
-}
-
-/// How binary files begin.
-const MAGIC: &[u8; 4] = b"glTF";
-
-/// Where JSON and binary chunk are in a file (glTF 2.0 section 4.4); a file without the magic number is all JSON.
-/// Not by `gltf::binary`, which refuses files with chunks of unknown types, and underflows on a length below 12.
-fn split(path: &Path, file: &Buffer) -> Result<(Range<u64>, Option<Range<u64>>), SceneError> {
-    let word = |at: u64| -> Result<Option<[u8; 4]>, SceneError> {
-        if at.saturating_add(4) > file.len() {
-            return Ok(None);
-        }
-        let bytes = file.range(at..at + 4).map_err(|error| unreadable(path, error))?;
-        Ok(Some((*bytes).try_into().expect("four bytes")))
-    };
-    let number = |at: u64| Ok(word(at)?.map(u32::from_le_bytes));
-    if word(0)? != Some(*MAGIC) {
-        return Ok((0..file.len(), None));
-    }
-    let damaged = |problem: String| {
-        invalid(
-            path,
-            "GLB container",
-            problem,
-            "the file is damaged: copy or export it again",
-        )
-    };
-    let (Some(version), Some(length)) = (number(4)?, number(8)?) else {
-        return Err(damaged(format!("the header is cut short at {} bytes", file.len())));
-    };
-    if version != 2 {
-        return Err(invalid(
-            path,
-            "GLB container",
-            format!("version {version}"),
-            "export the file as glTF 2.0",
-        ));
-    }
-    if u64::from(length) > file.len() {
-        return Err(damaged(format!(
-            "claims {length} bytes, but the file has {}",
-            file.len()
-        )));
-    }
-    let (mut at, mut json, mut blob) = (12, None, None);
-    while let (Some(size), Some(kind)) = (number(at)?, word(at + 4)?) {
-        let chunk = at + 8..at + 8 + u64::from(size);
-        if chunk.end > file.len() {
-            return Err(damaged(format!(
-                "a chunk claims {size} bytes at {}, but the file has {}",
-                chunk.start,
-                file.len()
-            )));
-        }
-        at = chunk.end;
-        match &kind {
-            b"JSON" if json.is_none() => json = Some(chunk),
-            b"BIN\0" if blob.is_none() => blob = Some(chunk),
-            // Section 4.4.3.1: clients must ignore chunks with unknown types.
-            _ => {}
-        }
-    }
-    Ok((json.ok_or_else(|| damaged("there is no JSON chunk".into()))?, blob))
-}
-
-/// Undoes percent encoding; a stray percent sign stands for itself.
-fn decode_percent(text: &str) -> Vec<u8> {
-    let bytes = text.as_bytes();
-    let digit = |at: usize| bytes.get(at).and_then(|&b| (b as char).to_digit(16));
-    let mut decoded = Vec::with_capacity(bytes.len());
-    let mut at = 0;
-    while at < bytes.len() {
-        match (bytes[at], digit(at + 1), digit(at + 2)) {
-            (b'%', Some(high), Some(low)) => {
-                decoded.push((high * 16 + low) as u8);
-                at += 3;
-            }
-            (byte, _, _) => {
-                decoded.push(byte);
-                at += 1;
-            }
-        }
-    }
-    decoded
-}
-
-/// Decodes base64 (RFC 4648, both alphabets); white space and padding are skipped. `None` for any other character.
-fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
-    let mut decoded = Vec::with_capacity(text.len() / 4 * 3 + 3);
-    let (mut bits, mut held) = (0_u32, 0);
-    for &byte in text {
-        let value = match byte {
-            b'A'..=b'Z' => byte - b'A',
-            b'a'..=b'z' => byte - b'a' + 26,
-            b'0'..=b'9' => byte - b'0' + 52,
-            b'+' | b'-' => 62,
-            b'/' | b'_' => 63,
-            b'=' | b' ' | b'\n' | b'\r' | b'\t' => continue,
-            _ => return None,
-        };
-        bits = bits << 6 | u32::from(value);
-        held += 6;
-        if held >= 8 {
-            held -= 8;
-            decoded.push((bits >> held) as u8);
-            bits &= (1 << held) - 1;
-        }
-    }
-    Some(decoded)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_of_every_length() {
-        assert_eq!(decode_base64(b"").unwrap(), b"");
-        assert_eq!(decode_base64(b"Zg==").unwrap(), b"f");
-        assert_eq!(decode_base64(b"Zm8=").unwrap(), b"fo");
-        assert_eq!(decode_base64(b"Zm9v\nYmFy").unwrap(), b"foobar");
-        assert_eq!(decode_base64(b"_-8").unwrap(), decode_base64(b"/+8=").unwrap());
-        assert!(decode_base64(b"Zm9v!").is_none());
-    }
 
     #[test]
     fn files_that_change_meanwhile_are_noticed() {
@@ -586,12 +286,5 @@ mod tests {
         let source = Source::open(&at("a.gltf"), u64::MAX).unwrap();
         std::fs::remove_file(at("a.bin")).unwrap();
         assert!(source.check_unchanged().is_err());
-    }
-
-    #[test]
-    fn percent_encoding() {
-        assert_eq!(decode_percent("a%20b%C5%99"), "a b\u{159}".as_bytes());
-        assert_eq!(decode_percent("100%"), b"100%");
-        assert_eq!(decode_percent("%zz%2"), b"%zz%2");
     }
 }

@@ -70,9 +70,9 @@ pub(crate) fn collect(parts: &mut SceneParts, shading: &mut Shading, radius: f32
 
 /// Indices of the punctual lights that shine, their power and numbers put right.
 fn check_punctual(parts: &mut SceneParts, radius: f32) -> Vec<u32> {
-    let (mut black, mut broken) = (0, 0);
+    let mut black = 0;
     let mut kept = Vec::new();
-    for (index, (light, _)) in parts.punctual.iter_mut().enumerate() {
+    for (index, (light, source)) in parts.punctual.iter_mut().enumerate() {
         let axis = light.normal_ws.as_dvec3().normalize_or_zero().as_vec3();
         let needs_axis = matches!(light.kind, LightKind::Spot | LightKind::Directional);
         let numbers = light.position_ws.is_finite()
@@ -81,7 +81,10 @@ fn check_punctual(parts: &mut SceneParts, radius: f32) -> Vec<u32> {
             && light.kind != LightKind::Triangle
             && !(light.range.is_nan() || light.cos_inner.is_nan() || light.cos_outer.is_nan());
         if !numbers || (needs_axis && axis == Vec3::ZERO) {
-            broken += 1;
+            let name = &source.node;
+            parts
+                .report
+                .warn(format!("punctual light '{name}' has unusable numbers: left out"));
         } else if light.intensity == Vec3::ZERO || light.range <= 0.0 {
             black += 1;
         } else {
@@ -91,13 +94,10 @@ fn check_punctual(parts: &mut SceneParts, radius: f32) -> Vec<u32> {
             kept.push(index as u32);
         }
     }
-    for (count, what) in [
-        (black, "punctual lights are black: left out"),
-        (broken, "punctual lights have unusable numbers: left out"),
-    ] {
-        if count > 0 {
-            parts.report.warn(format!("{count} {what}"));
-        }
+    if black > 0 {
+        parts
+            .report
+            .warn(format!("{black} punctual lights are black: left out"));
     }
     kept
 }

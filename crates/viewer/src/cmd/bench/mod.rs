@@ -19,6 +19,7 @@ use crate::session::BackEnd;
 use crate::{message, output, session};
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use clap::builder::PossibleValuesParser;
 use contestants::{Contestant, Knob};
 use light_cache::SamplerKind;
 use reference::Reference;
@@ -101,6 +102,9 @@ pub(crate) struct BenchArgs {
     #[arg(long, value_enum, value_name = "EFFORT", num_args = 0..=1, require_equals = true, default_missing_value = "standard",
           conflicts_with_all = ["scenes", "samplers", "scenario", "reference"])]
     stress: Option<stress::Effort>,
+    /// With --stress: only these families of checks
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "stress", value_parser = PossibleValuesParser::new(stress::families()))]
+    families: Vec<String>,
     /// With --stress: this program as it was built otherwise, such as without optimisation; its images have to be the same to the bit
     #[arg(long, value_name = "PROGRAM", requires = "stress")]
     other_build: Option<PathBuf>,

@@ -20,8 +20,8 @@ const P_VALUE: (&str, f64) = ("-log10 of the p-value", 5.0);
 
 /// Checks the family.
 pub(super) fn check(bench: &mut Bench) -> Result<()> {
-    distributions(bench);
-    updates(bench);
+    distributions(bench)?;
+    updates(bench)?;
     let counts: &[usize] = bench.pick(
         &[1, 2, 100],
         &[1, 2, 3, 10, 1_000, 100_000],
@@ -30,12 +30,10 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
     for &count in counts {
         let scene = lights(count)?;
         for kind in SamplerKind::ALL {
-            if bench.stopped() {
-                return Ok(());
-            }
+            bench.now(format_args!("{count} lights over 24 decades, {}", kind.name()))?;
             let judge = Judge {
                 scene: &scene,
-                draws: bench.pick(1 << 16, 1 << 18, 1 << 24),
+                draws: bench.pick(1 << 16, 1 << 18, 1 << 22),
             };
             let found = light_cache::build(&scene, &Settings::default(), kind, judge);
             for (state, found) in ["fresh", "taught"].into_iter().zip(found) {
@@ -50,17 +48,18 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
 }
 
 /// Integer distributions of up to a million entries over sixty decades.
-fn distributions(bench: &mut Bench) {
+fn distributions(bench: &mut Bench) -> Result<()> {
     for count in [1_u32, 2, 3, 1_000, 1_000_000] {
         let random = Random::new(3, count, 0);
         let weights: Vec<f64> = (0..count)
             .map(|i| 10_f64.powf(60.0 * f64::from(random.f32(i)) - 30.0))
             .collect();
         for floor in [0.0, 0.005] {
+            let hazard = format!("{count} weights over 60 decades, floor {floor}");
+            bench.now(&hazard)?;
             let distribution = Discrete::new(&weights, floor).expect("there are entries");
             let masses: Vec<u64> = (0..count).map(|i| distribution.mass(i)).collect();
             let least = (distribution.floor() * TOTAL as f64) as u64;
-            let hazard = format!("{count} weights over 60 decades, floor {floor}");
             bench.check(
                 &hazard,
                 "masses less 2^32",
@@ -83,12 +82,15 @@ fn distributions(bench: &mut Bench) {
             bench.check(&hazard, "bins that are missed", NEVER, lost as f64);
         }
     }
+    Ok(())
 }
 
 /// Millions of weights set anew in place, with zeros, denormals and giants among them.
-fn updates(bench: &mut Bench) {
+fn updates(bench: &mut Bench) -> Result<()> {
     let count = 1_000;
     let updates = bench.pick(100, 10_000, 100_000_u32);
+    let hazard = format!("{} weights updated", u64::from(updates) * count as u64);
+    bench.now(&hazard)?;
     let mut distribution = Discrete::new(&vec![1.0; count], 0.005).expect("there are entries");
     let mut weights = vec![1.0; count];
     let (mut off, mut below) = (0_u32, 0_u32);
@@ -111,9 +113,9 @@ fn updates(bench: &mut Bench) {
                 .any(|mass| (mass as f64) < distribution.floor() * TOTAL as f64),
         );
     }
-    let hazard = format!("{} weights updated", u64::from(updates) * count as u64);
     bench.check(&hazard, "totals that are not 2^32", NEVER, f64::from(off));
     bench.check(&hazard, "minima that are broken", NEVER, f64::from(below));
+    Ok(())
 }
 
 /// `count` triangle and point lights in a cube of 10 m over a floor, over twenty-four decades of strength.

@@ -24,7 +24,7 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
         ("a light cut in four", cut.0),
         ("black lights added", with_black_lights(parts)),
     ];
-    let effort = (16, bench.pick(16, 48, 256));
+    let effort = (16, bench.pick(16, 48, 192));
     for (name, method) in methods() {
         let shot = |scene: &Scene, seed| {
             let mut shot = Shot::new(scene, &camera, method, (24, 18))
@@ -33,6 +33,7 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
             shot.settings.max_bounces = 1;
             shot.estimate()
         };
+        bench.now(format_args!("the same scene in other forms, {name}"))?;
         let original = shot(&scene, 0)?;
         for (hazard, parts) in &changed {
             let changed = Scene::new(parts.clone())?;
@@ -90,6 +91,7 @@ fn threads(bench: &mut Bench) -> Result<()> {
                 Ok(rendering.film().image().pixels)
             })
         };
+        bench.now(format_args!("threads, {name}"))?;
         let one = picture(1)?;
         for threads in [2, 5] {
             let several = picture(threads)?;

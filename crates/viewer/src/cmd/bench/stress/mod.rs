@@ -17,11 +17,11 @@ mod sums;
 use super::BenchArgs;
 use crate::exit::Status;
 use crate::interrupt::Watch;
-use crate::{message, output, session};
+use crate::session;
 use anyhow::Result;
-use bench::Bench;
 pub(super) use bench::Effort;
-use std::time::Instant;
+use bench::{Bench, Stopped};
+use report::Report;
 
 /// A family of hazards: its name, and what checks it.
 type Family = (&'static str, fn(&mut Bench) -> Result<()>);
@@ -39,7 +39,12 @@ const FAMILIES: [Family; 10] = [
     ("builds", builds::check),
 ];
 
-/// Checks all hazards.
+/// The names of the families.
+pub(super) fn families() -> [&'static str; FAMILIES.len()] {
+    FAMILIES.map(|(name, _)| name)
+}
+
+/// Checks all hazards, or those of the families that are asked for.
 ///
 /// # Errors
 /// Files that cannot be written.
@@ -47,25 +52,26 @@ pub(super) fn run(args: &BenchArgs, effort: Effort) -> Result<Status> {
     super::make_output(&args.output, "stress.json")?;
     session::use_threads(args.light.threads)?;
     let watch = Watch::rendering();
-    let mut bench = Bench::new(effort, &watch, args.other_build.as_deref());
-    for (family, check) in FAMILIES {
-        let start = Instant::now();
+    let asked = |name: &str| args.families.is_empty() || args.families.iter().any(|family| family == name);
+    let families: Vec<Family> = FAMILIES.into_iter().filter(|(name, _)| asked(name)).collect();
+    let names = families.iter().map(|(name, _)| *name).collect();
+    let report = Report::new(args.output.join("stress.json"), names);
+    let mut bench = Bench::new(effort, &watch, args.other_build.as_deref(), report);
+    let checked = families.into_iter().try_for_each(|(family, check)| {
         bench.begin(family);
-        check(&mut bench)?;
-        message::note(format!("{family}: {:.1} s", start.elapsed().as_secs_f64()));
-        if watch.stopped() {
-            break;
-        }
-    }
+        check(&mut bench)
+    });
     let interrupted = watch.writing();
-    output::print(&report::table(bench.checks()))?;
-    let path = args.output.join("stress.json");
-    output::write(&path, report::json(bench.checks())?.as_bytes())?;
-    Ok(if interrupted {
-        Status::Interrupted
-    } else if bench.checks().iter().all(|check| check.passed) {
-        Status::Done
-    } else {
-        Status::Failed
+    match checked {
+        Err(error) if error.is::<Stopped>() => {}
+        other => other?,
+    }
+    let report = bench.finish();
+    let passed = report.passed();
+    report.finish(!interrupted)?;
+    Ok(match (interrupted, passed) {
+        (true, _) => Status::Interrupted,
+        (false, true) => Status::Done,
+        (false, false) => Status::Failed,
     })
 }

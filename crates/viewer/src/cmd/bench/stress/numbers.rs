@@ -39,6 +39,7 @@ const MOST_WEIGHT: f64 = 20.0;
 
 /// Checks the family.
 pub(super) fn check(bench: &mut Bench) -> Result<()> {
+    bench.now("densities and random numbers at their limits")?;
     mis_weights(bench);
     units(bench);
     warps(bench);

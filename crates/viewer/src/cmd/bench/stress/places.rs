@@ -41,17 +41,16 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
     ];
     for (name, parts) in scenes {
         for method in METHODS {
+            bench.now(format_args!("{name}, where it is, {}", method.name()))?;
             // Other random numbers for the means, which must agree by themselves; the same for the variances, which spikes dominate.
             let [original, alike] = [
                 measured(bench, parts.clone(), method, 0)?,
                 measured(bench, parts.clone(), method, 1000)?,
             ];
             for (place, scale, offset) in places {
-                if bench.stopped() {
-                    return Ok(());
-                }
-                let there = measured(bench, transformed(parts.clone(), scale, offset), method, 1000)?;
                 let hazard = format!("{name}, {place}");
+                bench.now(format_args!("{hazard}, {}", method.name()))?;
+                let there = measured(bench, transformed(parts.clone(), scale, offset), method, 1000)?;
                 compare(bench, &hazard, method.name(), &there, [&original, &alike]);
             }
         }
@@ -61,7 +60,7 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
 
 fn measured(bench: &Bench, parts: SceneParts, method: Method, seed: u64) -> Result<Estimate> {
     let scene = Scene::new(parts)?;
-    let mut shot = Shot::new(&scene, &scene.parts.cameras[0], method, (32, 24)).effort(16, bench.pick(12, 16, 256));
+    let mut shot = Shot::new(&scene, &scene.parts.cameras[0], method, (32, 24)).effort(16, bench.pick(12, 16, 64));
     shot.settings.max_bounces = 1;
     shot.seed(seed).estimate()
 }

@@ -1,13 +1,120 @@
-//! The checks as a table and as JSON.
+//! The checks as lines while they are made, as a table, and as JSON.
 
 use super::bench::Check;
 use crate::machine::Machine;
-use crate::table;
+use crate::progress::Spinner;
+use crate::{output, table};
 use anyhow::Result;
 use serde::Serialize;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// Results are written no more often: then no more of them are lost, should the program be ended from outside.
+const BETWEEN_SAVES: Duration = Duration::from_secs(1);
+
+/// All checks, and the file that they are kept in.
+pub(super) struct Report {
+    path: PathBuf,
+    families: Vec<&'static str>,
+    machine: Machine,
+    spinner: Spinner,
+    checks: Vec<Check>,
+    saved: Instant,
+}
+
+impl Report {
+    /// No check of `families` made yet; they will be written to `path`.
+    pub(super) fn new(path: PathBuf, families: Vec<&'static str>) -> Self {
+        Self {
+            path,
+            families,
+            machine: Machine::detect(),
+            spinner: Spinner::new(),
+            checks: Vec::new(),
+            saved: Instant::now(),
+        }
+    }
+
+    /// Tells what is being checked, and keeps what is known.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub(super) fn now(&mut self, what: &str) -> Result<()> {
+        self.spinner.now(what);
+        if self.saved.elapsed() >= BETWEEN_SAVES {
+            self.save(false)?;
+            self.saved = Instant::now();
+        }
+        Ok(())
+    }
+
+    /// Tells something.
+    pub(super) fn line(&self, text: &str) {
+        self.spinner.line(text);
+    }
+
+    /// Takes a check and tells its result.
+    pub(super) fn enter(&mut self, check: Check) {
+        self.spinner.line(&line(&check));
+        self.checks.push(check);
+    }
+
+    /// Whether nothing failed.
+    pub(super) fn passed(&self) -> bool {
+        self.checks.iter().all(|check| check.passed)
+    }
+
+    /// Writes the file; prints the table.
+    ///
+    /// # Errors
+    /// Those of files.
+    pub(super) fn finish(self, complete: bool) -> Result<()> {
+        self.save(complete)?;
+        drop(self.spinner);
+        output::print(&table(&self.checks))
+    }
+
+    fn save(&self, complete: bool) -> Result<()> {
+        #[derive(Serialize)]
+        struct Document<'a> {
+            version: &'static str,
+            machine: &'a Machine,
+            families: &'a [&'static str],
+            /// Whether these were checked to their ends.
+            complete: bool,
+            passed: bool,
+            checks: &'a [Check],
+        }
+        let document = Document {
+            version: crate::machine::VERSION,
+            machine: &self.machine,
+            families: &self.families,
+            complete,
+            passed: self.passed(),
+            // A deviation that is infinite or no number is null.
+            checks: &self.checks,
+        };
+        output::write(&self.path, (serde_json::to_string_pretty(&document)? + "\n").as_bytes())
+    }
+}
+
+/// One check, in columns that line up with those of the checks before and after it.
+fn line(check: &Check) -> String {
+    let verdict = if check.passed { "pass" } else { "FAIL" };
+    format!(
+        "{:>7.1} s  {verdict}  {:<10} {:<50} {:<22} {:>9} of {:>9} {}",
+        check.seconds,
+        check.family,
+        check.hazard,
+        check.subject,
+        exact(check.deviation),
+        exact(check.limit),
+        check.measure,
+    )
+}
 
 /// One line per hazard, with the subject that comes closest to the limit or goes furthest beyond; then all that failed.
-pub(super) fn table(checks: &[Check]) -> String {
+fn table(checks: &[Check]) -> String {
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut groups: Vec<Vec<&Check>> = Vec::new();
     for check in checks {
@@ -30,6 +137,7 @@ pub(super) fn table(checks: &[Check]) -> String {
                 worst.measure.into(),
                 worst.subject.clone(),
                 group.len().to_string(),
+                table::number(group.iter().map(|check| check.seconds).sum()),
                 exact(worst.deviation),
                 exact(worst.limit),
                 if failed == 0 {
@@ -46,6 +154,7 @@ pub(super) fn table(checks: &[Check]) -> String {
         "deviation in",
         "worst of all",
         "checks",
+        "seconds",
         "deviation",
         "limit",
         "result",
@@ -84,25 +193,4 @@ fn exact(value: f64) -> String {
     } else {
         value.to_string()
     }
-}
-
-/// All checks, and where they were made. A deviation that is infinite or no number is null.
-///
-/// # Errors
-/// None that can be expected.
-pub(super) fn json(checks: &[Check]) -> Result<String> {
-    #[derive(Serialize)]
-    struct Document<'a> {
-        version: &'static str,
-        machine: Machine,
-        passed: bool,
-        checks: &'a [Check],
-    }
-    let document = Document {
-        version: crate::machine::VERSION,
-        machine: Machine::detect(),
-        passed: checks.iter().all(|check| check.passed),
-        checks,
-    };
-    Ok(serde_json::to_string_pretty(&document)? + "\n")
 }

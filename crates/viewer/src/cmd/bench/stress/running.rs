@@ -18,9 +18,7 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
         SamplerKind::Table,
         SamplerKind::Adaptive,
     ] {
-        if bench.stopped() {
-            return Ok(());
-        }
+        bench.now(format_args!("{frames} frames, {}", kind.name()))?;
         let walk = Walk { scene: &scene, frames };
         let found = light_cache::build(&scene, &Settings::default(), kind, walk);
         let hazard = format!("{frames} frames");
@@ -47,13 +45,14 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
         );
         bench.check(&hazard, kind.name(), NEVER, found.faults as f64);
     }
-    moments(bench);
-    Ok(())
+    moments(bench)
 }
 
 /// Welford's moments of as many samples, noisy and sparse, against sums of integers, which are exact.
-fn moments(bench: &mut Bench) {
+fn moments(bench: &mut Bench) -> Result<()> {
     let count = bench.pick(1_u32 << 16, 1 << 24, 1 << 25);
+    let hazard = format!("{count} samples, one in a thousand large");
+    bench.now(&hazard)?;
     let mut moments = Moments::default();
     let (mut sum, mut squares) = (0_u128, 0_u128);
     for i in 0..count {
@@ -69,7 +68,6 @@ fn moments(bench: &mut Bench) {
     }
     let n = f64::from(count);
     let variance = (squares as f64 - sum as f64 * (sum as f64 / n)) / (n - 1.0);
-    let hazard = format!("{count} samples, one in a thousand large");
     bench.check(
         &hazard,
         "moments, mean",
@@ -82,6 +80,7 @@ fn moments(bench: &mut Bench) {
         ("relative error", 1e-6),
         (moments.variance() / variance - 1.0).abs(),
     );
+    Ok(())
 }
 
 /// Many frames of few observations for a sampler and the records around it.

@@ -2,7 +2,7 @@
 
 use super::bench::{Bench, NEVER};
 use anyhow::Result;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use render::Film;
 use sampling::{PairSum, Random};
 
@@ -29,11 +29,12 @@ pub(super) fn check(bench: &mut Bench) -> Result<()> {
         ),
         ("1e-30", |_| 1e-30, false),
     ] {
-        if bench.stopped() {
-            return Ok(());
-        }
-        film(bench, &format!("{frames} frames of {hazard}"), frames, value, weighted);
+        let hazard = format!("{frames} frames of {hazard}");
+        bench.now(&hazard)?;
+        film(bench, &hazard, frames, value, weighted);
     }
+    left_out(bench);
+    bench.now("pairs of f32")?;
     pairs(bench, frames, noisy);
     Ok(())
 }
@@ -100,6 +101,32 @@ fn film(bench: &mut Bench, hazard: &str, frames: u32, value: fn(u32) -> f32, wei
     let resolution = 1e-14 * mean * mean * luminance * luminance + f64::from(f32::MIN_POSITIVE);
     let error = (f64::from(found) - expected).abs() / (expected + resolution);
     bench.check(hazard, "film, variance", ("relative error", 1e-3), error);
+}
+
+/// Samples that are not finite are counted and do not change the image, in whichever channel and at whatever weight.
+fn left_out(bench: &mut Bench) {
+    let hazard = "samples that are not finite";
+    let good = |frame: u32| Vec3::new(1.0, 2.0, 3.0) * Random::new(14, frame, 0).f32(0);
+    let bad = |frame: u32| {
+        let value = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY][frame as usize % 3];
+        good(frame).with_x(value).to_array()
+    };
+    let (mut clean, mut mixed) = (Film::new(1, 1, false), Film::new(1, 1, false));
+    let mut counted = 0;
+    for frame in 0..999 {
+        let weight = 1.0 + (frame % 4) as f32;
+        clean.add_frame(weight, |_, _| good(frame));
+        mixed.add_frame(weight, |_, _| good(frame));
+        let mut odd = bad(frame);
+        odd.rotate_left(frame as usize / 3 % 3);
+        counted += mixed.add_frame(weight, |_, _| Vec3::from_array(odd));
+    }
+    let [clean, mixed] = [clean, mixed].map(|film| DVec3::from(film.image().pixels[0].map(f64::from)));
+    bench.check(hazard, "film, samples miscounted", NEVER, counted.abs_diff(999) as f64);
+    let error = (mixed / clean - 1.0).abs().max_element();
+    // No number is the largest error of all, which a maximum would pass over.
+    let error = if mixed.is_finite() { error } else { f64::NAN };
+    bench.check(hazard, "film, mean", ("relative error", 1e-6), error);
 }
 
 /// The compensated pair of `f32`, as back ends without double precision use it.

@@ -1,0 +1,8 @@
+//! Camera paths.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    viewer::untrusted::camera_path(data);
+});

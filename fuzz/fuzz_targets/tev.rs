@@ -1,0 +1,8 @@
+//! Titles of images that tev shows.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    viewer::untrusted::tev(data);
+});

@@ -1,0 +1,8 @@
+//! What the window remembers.
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+
+fuzz_target!(|data: &[u8]| {
+    viewer::untrusted::window(data);
+});
