@@ -298,6 +298,26 @@ fn images_at_the_same_seed_agree() {
     }
 }
 
+/// The camera looks away from everything.
+#[test]
+fn frames_that_observe_nothing_teach_nothing() {
+    let Some(gpu) = gpu() else { return };
+    let scene = scene::load("demo:points:64").expect("it is generated");
+    let away = scene::Camera::look_at("away", Vec3::splat(1e3), Vec3::splat(2e3), Vec3::Y, 0.5);
+    let settings = Settings {
+        width: 16,
+        height: 16,
+        method: Method::Sampled(SamplerKind::Table),
+        ..Settings::default()
+    };
+    let mut frames = render::gpu::renderer(gpu, &scene, &away, &settings).expect("it fits");
+    for _ in 0..6 {
+        assert!(frames.render_frame());
+    }
+    assert!(frames.error().is_none());
+    assert_eq!(frames.film().image().pixels, vec![[0.0; 3]; 256]);
+}
+
 #[test]
 fn what_the_gpu_lacks_is_refused_with_the_remedy() {
     let Some(gpu) = gpu() else { return };

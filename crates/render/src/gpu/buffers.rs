@@ -59,7 +59,9 @@ pub(super) fn read<T>(gpu: &Gpu, buffer: &wgpu::Buffer, look: impl FnOnce(&[u8])
 /// The same with the first `size` bytes alone, a multiple of 4.
 pub(super) fn read_start<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: usize, look: impl FnOnce(&[u8]) -> T) -> Option<T> {
     if size == 0 {
-        return Some(look(&[]));
+        // Aligned as what is mapped is, for those who look at it as records.
+        const NOTHING: &[u64] = &[];
+        return Some(look(bytemuck::cast_slice(NOTHING)));
     }
     let copy = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read back"),
