@@ -135,22 +135,19 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
     let record = scene.triangles + (details[instance + INSTANCE_FIRST_TRIANGLE] + hit.id.y) * TRIANGLE_WORDS;
     let local_normal = detail_vec3(record);
     let material_word = details[record + 4u];
-    var on_plane: vec3<f32>;
+    var position_ws: vec3<f32>;
     var normal_ws = local_normal;
     if !HAS_INSTANCES || details[instance + INSTANCE_IDENTITY] != 0u {
         let along = ray.origin_ws + ray.direction_ws * hit.t;
-        on_plane = along - local_normal * (dot(local_normal, along) - detail_f32(record + 3u));
+        position_ws = along - local_normal * (dot(local_normal, along) - detail_f32(record + 3u));
     } else {
         let mesh = mesh_of(hit.id.x);
         let local = stream_vec3(place_on(mesh, hit.id.y, hit.u, hit.v), details[mesh + MESH_POSITIONS]);
         let at = instance + WORLD_FROM_LOCAL;
-        on_plane = matrix_at(at) * local + detail_vec3(at + 9u);
+        position_ws = matrix_at(at) * local + detail_vec3(at + 9u);
         normal_ws = normalize(matrix_at(instance + WORLD_NORMAL_FROM_LOCAL) * local_normal);
     }
-    let facing = dot(normal_ws, ray.direction_ws);
-    let back = max(hit.t, max_element(abs(on_plane))) / 262144.0;
-    let position_ws = on_plane + (normal_ws * facing - ray.direction_ws) * back;
-    let front = facing <= 0.0;
+    let front = dot(normal_ws, ray.direction_ws) <= 0.0;
     let geometric_normal_ws = select(-normal_ws, normal_ws, front);
     let material = material_at(material_word & ~(SMOOTH | DETAILED));
     let emitter = details[record + 5u];

@@ -41,21 +41,16 @@ impl Scene {
             true => &self.shading.fixed[hit.id.triangle as usize],
             false => self.placed_record(placement.mesh, hit.id.triangle),
         };
-        let (on_plane, normal_ws) = if placement.fixed {
+        let (position_ws, normal_ws) = if placement.fixed {
             // Pulled on to the plane: as exact across the surface as interpolation of the corners, without reading them.
+            // What error remains lies within the plane, where it does no harm.
             let along = ray.origin_ws + ray.direction_ws * hit.t;
             let off = triangle.normal.dot(along) - triangle.plane;
             (along - triangle.normal * off, triangle.normal)
         } else {
             self.placed(hit, triangle)
         };
-        // What error remains lies within the plane. Next to an edge it could carry the point across the plane of the neighbouring triangle, from
-        // where shadow rays reach what lies outside of closed walls: back by more than that, the way the ray came.
-        const BACK: f32 = 1.0 / 262_144.0;
-        let facing = normal_ws.dot(ray.direction_ws);
-        let back = BACK * hit.t.max(on_plane.abs().max_element());
-        let position_ws = on_plane + (normal_ws * facing - ray.direction_ws) * back;
-        let front = facing <= 0.0;
+        let front = normal_ws.dot(ray.direction_ws) <= 0.0;
         let geometric_normal_ws = if front { normal_ws } else { -normal_ws };
         let material = &self.shading.materials[triangle.material() as usize];
         let light = match triangle.emitter {

@@ -72,11 +72,7 @@ fn a_hit_is_resolved_wherever_the_mesh_is_placed() {
             let target = place.transform_point3(Vec3::new(0.3, 0.4, 0.0));
             let eye = target + front * 4.0 + place.transform_vector3(Vec3::X);
             let surface = see(&scene, eye, target).expect("the front is there");
-            let off = surface.position_ws - target;
-            assert!(off.dot(front).abs() < 1e-5);
-            // Within the plane it lies a little back, see `Scene::surface`.
-            let back = eye.distance(target).max(target.abs().max_element()) / 262_144.0;
-            assert!(off.length() < 1e-5 + back);
+            assert!((surface.position_ws - target).length() < 1e-5);
             assert!((surface.geometric_normal_ws - front).length() < 1e-5);
             assert!((surface.bsdf.normal_ws - front).length() < 1e-5);
             assert_eq!(surface.emitted, Vec3::new(1.0, 2.0, 3.0));
@@ -138,42 +134,6 @@ fn rays_leave_on_the_right_side_at_any_scale() {
                 assert!(!scene.occluded(&ray, PrimitiveId::NONE, PrimitiveId::NONE));
             }
         }
-    }
-}
-
-/// From beyond a wall shadow rays reach what lies outside. Rays from inside to the very edges of a box, near the origin and far from it.
-#[test]
-fn no_hit_lies_beyond_the_wall_next_to_it() {
-    for offset in [0.0, 100.0] {
-        let (low, high) = (Vec3::splat(offset), Vec3::splat(offset) + Vec3::new(3.0, 2.0, 2.5));
-        let mut builder = crate::assemble::Builder::default();
-        let wall = builder.material(Material::lambert("wall", Vec3::splat(0.8)));
-        builder.room(low, high, wall);
-        let scene = builder.build().expect("it is valid");
-        let corners = &scene.parts.meshes[0].positions;
-        let low = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
-        let high = corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
-        let mut seen = 0;
-        for i in 0..40_000 {
-            let random = sampling::Random::new(7, i, 0);
-            let [from, to] = [0, 3].map(|d| Vec3::from_array([0, 1, 2].map(|axis| random.f32(d + axis))));
-            let from = low + (high - low) * (0.02 + 0.96 * from);
-            // On one of the twelve edges: two coordinates are those of walls.
-            let free = i as usize % 3;
-            let mut to = low + (high - low) * to;
-            for (n, axis) in [(free + 1) % 3, (free + 2) % 3].into_iter().enumerate() {
-                to[axis] = if i >> (3 + n) & 1 == 0 { low[axis] } else { high[axis] };
-            }
-            if let Some(surface) = see(&scene, from, to) {
-                let p = surface.position_ws;
-                let normal_axis = surface.geometric_normal_ws.abs().max_position();
-                for axis in (0..3).filter(|axis| *axis != normal_axis) {
-                    assert!(p[axis] > low[axis] && p[axis] < high[axis], "{p} from {from} to {to}");
-                }
-                seen += 1;
-            }
-        }
-        assert!(seen > 39_000, "{seen}");
     }
 }
 
