@@ -11,6 +11,8 @@ struct Surface {
     light: u32,
     geometric_normal_ws: vec3<f32>,
     id: vec2<u32>,
+    // Towards where the ray came from, as far as that lies within the surface.
+    back_ws: vec3<f32>,
     emitted: vec3<f32>,
     bsdf: Bsdf,
 }
@@ -147,7 +149,8 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
         position_ws = matrix_at(at) * local + detail_vec3(at + 9u);
         normal_ws = normalize(matrix_at(instance + WORLD_NORMAL_FROM_LOCAL) * local_normal);
     }
-    let front = dot(normal_ws, ray.direction_ws) <= 0.0;
+    let facing = dot(normal_ws, ray.direction_ws);
+    let front = facing <= 0.0;
     let geometric_normal_ws = select(-normal_ws, normal_ws, front);
     let material = material_at(material_word & ~(SMOOTH | DETAILED));
     let emitter = details[record + 5u];
@@ -161,6 +164,7 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
         light,
         geometric_normal_ws,
         hit.id,
+        normal_ws * facing - ray.direction_ws,
         select(vec3<f32>(0.0), detail_vec3(material + MATERIAL_EMISSION), emits),
         Bsdf(
             geometric_normal_ws,
@@ -180,7 +184,8 @@ fn surface_at(ray: Ray, hit: Hit) -> Surface {
 fn off_surface(surface: Surface, wi_ws: vec3<f32>) -> vec3<f32> {
     let largest = max(max_element(abs(surface.position_ws)), scene.radius / 32.0);
     let size = largest / 65536.0;
-    return surface.geometric_normal_ws * select(size, -size, dot(wi_ws, surface.geometric_normal_ws) < 0.0);
+    let side = select(size, -size, dot(wi_ws, surface.geometric_normal_ws) < 0.0);
+    return surface.geometric_normal_ws * side + surface.back_ws * size;
 }
 
 // twin: crates/scene/src/surface.rs ray_from

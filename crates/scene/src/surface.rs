@@ -16,6 +16,8 @@ pub struct Surface {
     /// Unit geometric normal on the viewer's side. Light whose direction has a cosine of 0 or less with it cannot arrive,
     /// whatever the shading normal says: integrators must test this, or light leaks through smooth surfaces.
     pub geometric_normal_ws: Vec3,
+    /// Towards where the ray came from, as far as that lies within the surface: shorter than 1.
+    pub back_ws: Vec3,
     /// The triangle: rays that leave pass it to be skipped.
     pub id: PrimitiveId,
     /// Index of the material.
@@ -43,14 +45,15 @@ impl Scene {
         };
         let (position_ws, normal_ws) = if placement.fixed {
             // Pulled on to the plane: as exact across the surface as interpolation of the corners, without reading them.
-            // What error remains lies within the plane, where it does no harm.
+            // What error remains lies within the plane: rays that leave are kept from doing harm there, see [`Scene::ray_from`].
             let along = ray.origin_ws + ray.direction_ws * hit.t;
             let off = triangle.normal.dot(along) - triangle.plane;
             (along - triangle.normal * off, triangle.normal)
         } else {
             self.placed(hit, triangle)
         };
-        let front = normal_ws.dot(ray.direction_ws) <= 0.0;
+        let facing = normal_ws.dot(ray.direction_ws);
+        let front = facing <= 0.0;
         let geometric_normal_ws = if front { normal_ws } else { -normal_ws };
         let material = &self.shading.materials[triangle.material() as usize];
         let light = match triangle.emitter {
@@ -61,6 +64,7 @@ impl Scene {
         let surface = Surface {
             position_ws,
             geometric_normal_ws,
+            back_ws: normal_ws * facing - ray.direction_ws,
             id: hit.id,
             material: triangle.material(),
             uv: Vec2::ZERO,
@@ -145,7 +149,9 @@ impl Scene {
     ///
     /// The length is 128 units in the last place of the largest coordinate, well above the error of `position_ws` (after
     /// Waechter and Binder, Ray Tracing Gems 2019, chapter 6). Differs: one length for all coordinates, and near the
-    /// origin a share of the scene's radius instead of a constant in metres, so that a scaled scene gives the same image.
+    /// origin a share of the scene's radius instead of a constant in metres, so that a scaled scene gives the same image. And as far
+    /// within the surface, back the way the ray came that met it: next to an edge rounding may have carried the point across the plane of the
+    /// neighbouring triangle, from where rays would leave a closed room; the way that the ray came was free.
     #[inline]
     pub fn ray_from(&self, surface: &Surface, wi_ws: Vec3, t_max: f32) -> Ray {
         Ray {
@@ -179,8 +185,9 @@ impl Scene {
         // better known than that.
         const NEAR_ORIGIN: f32 = 1.0 / 32.0;
         let largest = surface.position_ws.abs().max_element().max(self.radius * NEAR_ORIGIN);
-        let length = (UNITS * largest).copysign(wi_ws.dot(surface.geometric_normal_ws));
-        surface.geometric_normal_ws * length
+        let length = UNITS * largest;
+        let side = length.copysign(wi_ws.dot(surface.geometric_normal_ws));
+        surface.geometric_normal_ws * side + surface.back_ws * length
     }
 }
 

@@ -137,6 +137,47 @@ fn rays_leave_on_the_right_side_at_any_scale() {
     }
 }
 
+/// From beyond a wall rays reach what lies outside. Rays from inside to the very edges of a box, near the origin and far from it.
+#[test]
+fn no_ray_starts_beyond_the_wall_next_to_it() {
+    for offset in [0.0, 100.0] {
+        let low = Vec3::splat(offset);
+        let mut builder = crate::assemble::Builder::default();
+        let wall = builder.material(Material::lambert("wall", Vec3::splat(0.8)));
+        builder.room(low, low + Vec3::new(3.0, 2.0, 2.5), wall);
+        let scene = builder.build().expect("it is valid");
+        let corners = &scene.parts.meshes[0].positions;
+        let low = corners.iter().copied().fold(Vec3::INFINITY, Vec3::min);
+        let high = corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
+        let mut seen = 0;
+        for i in 0..40_000 {
+            let random = sampling::Random::new(7, i, 0);
+            let [from, to] = [0, 3].map(|d| Vec3::from_array([0, 1, 2].map(|axis| random.f32(d + axis))));
+            let from = low + (high - low) * (0.02 + 0.96 * from);
+            // On one of the twelve edges: two coordinates are those of walls.
+            let free = i as usize % 3;
+            let mut to = low + (high - low) * to;
+            for (n, axis) in [(free + 1) % 3, (free + 2) % 3].into_iter().enumerate() {
+                to[axis] = if i >> (3 + n) & 1 == 0 { low[axis] } else { high[axis] };
+            }
+            let Some(surface) = see(&scene, from, to) else { continue };
+            let toward = (from - surface.position_ws).normalize();
+            for ray in [
+                scene.ray_from(&surface, toward, f32::INFINITY),
+                scene.shadow_ray(&surface, toward, 1.0),
+            ] {
+                let start = ray.origin_ws;
+                assert!(
+                    start.cmpgt(low).all() && start.cmplt(high).all(),
+                    "{start} from {from} to {to}"
+                );
+            }
+            seen += 1;
+        }
+        assert!(seen > 39_000, "{seen}");
+    }
+}
+
 #[test]
 fn lights_are_in_a_stable_order_along_a_curve() {
     let mut dice = parts(vec![glow()], &[Affine3A::IDENTITY]);
