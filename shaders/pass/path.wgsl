@@ -27,6 +27,8 @@ override RESAMPLES: bool = false;
 
 // twin: crates/render/src/path.rs GLOSSY_ALPHA
 const GLOSSY_ALPHA: f32 = 0.5;
+// twin: crates/render/src/path.rs ROULETTE_BELOW
+const ROULETTE_BELOW: f32 = 0.25;
 // twin: crates/render/src/path.rs MIN_SURVIVAL
 const MIN_SURVIVAL: f32 = 0.05;
 // twin: crates/render/src/settings.rs MAX_CANDIDATES
@@ -299,7 +301,7 @@ fn trace_path(pixel: u32, eye_ray: Ray, log: ptr<function, Log>) -> PathSample {
 
         // Russian roulette on the largest component.
         let numbers = vertex_sequence(frame.seed, pixel, frame.frame, bounce);
-        let survival = clamp(max_element(throughput), MIN_SURVIVAL, 1.0);
+        let survival = clamp(max_element(throughput) / ROULETTE_BELOW, MIN_SURVIVAL, 1.0);
         let u = sequence_unit(numbers, 5u);
         if u >= survival {
             break;

@@ -105,9 +105,9 @@ pub struct Observation {
 /// What a path found in the direction in which it left a vertex.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Bounce {
-    /// The part of the hemisphere ([`sampling::guide::part_of`]).
+    /// The part of the hemisphere ([`sampling::guide::part_of`]), less than [`sampling::guide::PARTS`].
     pub part: u16,
-    /// Luminance of the radiance that came from there, as far as the path found it, over the share of the light that is reflected. Finite.
+    /// Luminance of the radiance that arrived from there, as the path estimated it (its throughput after the bounce divided out). Finite, at least 0.
     pub radiance: f32,
 }
 

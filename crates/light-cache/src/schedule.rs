@@ -12,6 +12,7 @@
 use crate::state::is_amount;
 use crate::tree::Receiver;
 use crate::{Observation, Pace};
+use sampling::guide::PARTS;
 use sampling::hash::hash3;
 use std::borrow::Cow;
 use std::ops::Range;
@@ -173,6 +174,8 @@ impl Schedule {
                 && [o.unshadowed, o.irradiance, o.pmf].into_iter().all(is_amount)
                 && o.pmf > 0.0
                 && o.weight > 0
+                && o.bounce
+                    .is_none_or(|bounce| usize::from(bounce.part) < PARTS && is_amount(bounce.radiance))
         };
         self.growth == other.growth && self.frame < u32::MAX && self.kept.iter().flatten().all(sound)
     }
@@ -227,6 +230,29 @@ mod tests {
             bounce: None,
         };
         (0..count).map(observation).collect()
+    }
+
+    #[test]
+    fn observations_that_no_path_makes_are_not_taken_over() {
+        let sound = |bounce| {
+            let mut schedule = Schedule::new(2);
+            let observation = Observation { bounce, ..log(1)[0] };
+            (0..SINGLE_FRAMES + 1).for_each(|_| drop(schedule.end_frame(&[vec![observation]])));
+            schedule.is_sound_like(&Schedule::new(2), 1)
+        };
+        let bounce = |part: usize, radiance| {
+            let part = part as u16;
+            Some(crate::Bounce { part, radiance })
+        };
+        assert!(sound(None) && sound(bounce(PARTS - 1, 2.0)));
+        for odd in [
+            bounce(PARTS, 1.0),
+            bounce(0, -1.0),
+            bounce(0, f32::NAN),
+            bounce(0, f32::INFINITY),
+        ] {
+            assert!(!sound(odd), "{odd:?}");
+        }
     }
 
     #[test]

@@ -25,7 +25,12 @@ use scene::{Bsdf, PrimitiveId, Ray, Scene, Surface};
 /// sampling alone does as well there. Higher values trace more rays; lower values leave noise in reflections of lamps.
 const GLOSSY_ALPHA: f32 = 0.5;
 
-/// Least probability with which Russian roulette lets a path live, so that no weight grows beyond 20.
+/// Worth below which paths play Russian roulette, and what those that survive are worth again. Where lights and bounces are drawn well, roulette is the
+/// largest part of the noise. Higher values end paths sooner; lower values trace more rays. (In rooms, 4 bounces: 0.45 times the error of 1 for 1.4 times the time; the tree
+/// 0.7 and 1.35 times.)
+const ROULETTE_BELOW: f32 = 0.25;
+
+/// Least probability with which Russian roulette lets a path live, so that no weight grows by more than 20.
 const MIN_SURVIVAL: f32 = 0.05;
 
 /// Everything a frame reads and nothing that it changes.
@@ -277,7 +282,7 @@ pub(crate) fn path<D: DirectLight>(
         // Russian roulette on the largest component: luminance would kill saturated blues with large weights.
         let sequence = PixelSequence::new(view.seed, start.pixel, start.sample);
         let numbers = sequence.vertex(bounce);
-        let survival = unguided.max_element().clamp(MIN_SURVIVAL, 1.0);
+        let survival = (unguided.max_element() / ROULETTE_BELOW).clamp(MIN_SURVIVAL, 1.0);
         let u = numbers.f32(5);
         if u >= survival {
             break;

@@ -135,7 +135,7 @@ impl Directions {
 
     /// Takes note, `times` times, of what a path found that left from `cube`. Places are made where they are missing, if they `may_grow` in number.
     pub(super) fn observe(&mut self, cube: Cube, bounce: Bounce, times: f32, may_grow: bool) {
-        let part = usize::from(bounce.part) % PARTS;
+        let part = usize::from(bounce.part);
         let most = if self.whole.all.count >= ENOUGH {
             LARGEST.min(SPIKE * self.whole.all.mean_sq())
         } else {
@@ -232,7 +232,7 @@ mod tests {
         let mut directions = Directions::new();
         for part in 0..1000 {
             let bounce = Bounce {
-                part,
+                part: part % PARTS as u16,
                 radiance: if part % 3 == 0 { f32::MAX } else { 0.0 },
             };
             directions.observe(Cube::at([1, 2, 3]), bounce, 1e6, true);
