@@ -54,6 +54,34 @@ fn a_benchmark_writes_its_files_and_keeps_its_reference() {
 }
 
 #[test]
+fn references_of_ones_own_are_one_image_or_two_independent_ones() {
+    let temporary = folder();
+    let folder = temporary.path();
+    for seed in ["1", "2"] {
+        let name = format!("{seed}.exr");
+        let size = ["--width=32", "--height=24", "--spp=4", "--seed", seed, "-o", &name];
+        let output = manylight(folder, &[&["render", "demo:rooms:16"][..], &size].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+    let bench = ["bench", "demo:rooms:16", "--width=32", "--height=24", "-o", "results"];
+    let with = |reference| {
+        [
+            &bench[..],
+            &["--time=0.01", "--samplers=uniform", "--reference", reference],
+        ]
+        .concat()
+    };
+    for (reference, estimator) in [("1.exr", "plain"), ("1.exr,2.exr", "cross product")] {
+        let output = manylight(folder, &with(reference));
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert!(stdout(&output).contains(estimator), "{}", stdout(&output));
+    }
+    for (reference, word) in [("1.exr,1.exr", "independent"), ("1.exr,2.exr,1.exr", "3 are given")] {
+        refused(folder, &with(reference), &[word, "--reference"]);
+    }
+}
+
+#[test]
 fn oracle_is_marked_as_research() {
     let temporary = folder();
     let folder = temporary.path();

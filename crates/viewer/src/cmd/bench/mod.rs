@@ -85,9 +85,10 @@ pub(crate) struct BenchArgs {
     /// Higher values tell smaller errors apart; lower values are done sooner.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(2..))]
     reference_spp: u64,
-    /// Use this image (.exr) as the reference, whose noise then counts as error; with one scene only
-    #[arg(long, value_name = "FILE")]
-    reference: Option<PathBuf>,
+    /// Use this image (.exr) as the reference, whose noise then counts as error; or two that are independent of each other (other seeds), whose noise
+    /// does not. With one scene only
+    #[arg(long, value_name = "FILE[,FILE]", value_delimiter = ',')]
+    reference: Vec<PathBuf>,
     /// Folder in which references are kept; default: the user's cache folder
     #[arg(long, value_name = "DIR")]
     reference_cache: Option<PathBuf>,
@@ -150,14 +151,14 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         [] => scene::generate::names().map(|name| format!("demo:{name}")).collect(),
         some => some.to_vec(),
     };
-    if args.reference.is_some() && args.scenario.is_some() {
+    if !args.reference.is_empty() && args.scenario.is_some() {
         bail!("--reference is one image, a scenario needs one for every state and camera: leave it away");
     }
     if args.camera_path.is_some() && args.scenario != Some(Scenario::Walk) {
         bail!("--camera-path is for --scenario walk: in the others the camera stays where it is");
     }
     let path = args.camera_path.as_deref().map(camera_path::read).transpose()?;
-    if args.reference.is_some() && scenes.len() != 1 {
+    if !args.reference.is_empty() && scenes.len() != 1 {
         bail!("--reference is for one scene, {} are given", scenes.len());
     }
     let mut times = args.time.clone();
@@ -165,6 +166,10 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
     times.dedup();
     let settings = args.light.settings(methods[0], args.size.or((256, 192)));
     settings.check()?;
+    let own_reference = match args.reference.as_slice() {
+        [] => None,
+        own => Some(Reference::read(own, &settings)?),
+    };
     make_output(&args.output, "summary.json")?;
     let cache = args
         .reference_cache
@@ -191,8 +196,8 @@ pub(crate) fn run(args: &BenchArgs) -> Result<Status> {
         let loaded = session::load_with_warnings(what)?;
         let camera = session::camera(&loaded.scene, args.light.camera.as_deref())?;
         let watch = Watch::rendering();
-        let reference = match &args.reference {
-            Some(path) => Some(Reference::read(path, &settings)?),
+        let reference = match &own_reference {
+            Some(own) => Some(own.clone()),
             None => Reference::get(&loaded.scene, camera, &settings, args.reference_spp, &cache, &watch)?,
         };
         let Some(reference) = reference else {

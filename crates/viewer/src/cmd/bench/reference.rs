@@ -46,31 +46,28 @@ pub(super) fn default_cache(output: &Path) -> PathBuf {
 }
 
 impl Reference {
-    /// Reads one that the user has.
+    /// Reads one that the user has: one image, or two that are independent of each other.
     ///
     /// # Errors
-    /// If it cannot be read, or has another size than the runs.
-    pub(super) fn read(path: &Path, settings: &Settings) -> Result<Self> {
-        let image = image::read_exr(path)?;
-        if (image.width, image.height) != (settings.width, settings.height) {
-            bail!(
-                "{}: the reference is {} x {}, the runs are {} x {}; give --width and --height",
-                path.display(),
-                image.width,
-                image.height,
-                settings.width,
-                settings.height
-            );
-        }
-        let facts = Facts {
-            origin: path.display().to_string(),
-            spp: None,
-            estimator: PLAIN,
+    /// If one cannot be read, or has another size than the runs; if there are more than two.
+    pub(super) fn read(paths: &[PathBuf], settings: &Settings) -> Result<Self> {
+        let images = paths.iter().map(|path| read_one(path, settings));
+        let images = images.collect::<Result<Vec<Image>>>()?;
+        let estimator = match images.as_slice() {
+            [_] => PLAIN,
+            [a, b] if a.pixels == b.pixels => {
+                bail!("--reference: the two images are the same: give independent ones, or one")
+            }
+            [_, _] => BY_HALVES,
+            _ => bail!("--reference is one image or two, {} are given", images.len()),
         };
-        Ok(Self {
-            images: vec![image],
-            facts,
-        })
+        let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        let facts = Facts {
+            origin: names.join(" and "),
+            spp: None,
+            estimator,
+        };
+        Ok(Self { images, facts })
     }
 
     /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to an even number), half of them
@@ -149,6 +146,22 @@ impl Reference {
             _ => None,
         }
     }
+}
+
+/// An image of the size of the runs.
+fn read_one(path: &Path, settings: &Settings) -> Result<Image> {
+    let image = image::read_exr(path)?;
+    if (image.width, image.height) != (settings.width, settings.height) {
+        bail!(
+            "{}: the reference is {} x {}, the runs are {} x {}; give --width and --height",
+            path.display(),
+            image.width,
+            image.height,
+            settings.width,
+            settings.height
+        );
+    }
+    Ok(image)
 }
 
 /// Names a reference by all that its pixels depend on: the scene's content, the camera, the settings, the version.
