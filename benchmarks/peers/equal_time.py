@@ -39,7 +39,7 @@ def exr(path):
 
 
 def error(image, halves):
-    """Cross product of two halves: the noise of the reference adds no offset. As `manylight bench` does."""
+    """Cross product of two halves, relative to their mean: the noise of a good reference adds next to no offset."""
     x, a, b = (np.asarray(i, np.float64)[..., :3] @ LUMINANCE for i in (image, *halves))
     r = (a + b) / 2
     relative = ((x - a) * (x - b) / (r**2 + 1e-2 * r.mean() ** 2)).ravel()

@@ -48,16 +48,16 @@ fn a_benchmark_writes_its_files_and_keeps_its_reference() {
     assert_eq!(summary["scenes"][0]["samplers"][0]["to_uniform"], 1.0);
     assert_eq!(summary["scenes"][0]["samplers"][1]["seeds"], 2);
     let kept = listing(&folder.join("cache"));
-    assert_eq!(kept.len(), 2, "two independent halves");
+    assert_eq!(kept.len(), 3, "three independent parts");
     assert_eq!(manylight(folder, &arguments).status.code(), Some(0));
     assert_eq!(listing(&folder.join("cache")), kept, "the reference is used again");
 }
 
 #[test]
-fn references_of_ones_own_are_one_image_or_two_independent_ones() {
+fn references_of_ones_own_are_one_image_or_independent_ones() {
     let temporary = folder();
     let folder = temporary.path();
-    for seed in ["1", "2"] {
+    for seed in ["1", "2", "3"] {
         let name = format!("{seed}.exr");
         let size = ["--width=32", "--height=24", "--spp=4", "--seed", seed, "-o", &name];
         let output = manylight(folder, &[&["render", "demo:rooms:16"][..], &size].concat());
@@ -71,13 +71,17 @@ fn references_of_ones_own_are_one_image_or_two_independent_ones() {
         ]
         .concat()
     };
-    for (reference, estimator) in [("1.exr", "plain"), ("1.exr,2.exr", "cross product")] {
+    for (reference, estimator) in [
+        ("1.exr", "plain"),
+        ("1.exr,2.exr", "adds an offset"),
+        ("1.exr,2.exr,3.exr", "adds no offset"),
+    ] {
         let output = manylight(folder, &with(reference));
         assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
         assert!(stdout(&output).contains(estimator), "{}", stdout(&output));
     }
-    for (reference, word) in [("1.exr,1.exr", "independent"), ("1.exr,2.exr,1.exr", "3 are given")] {
-        refused(folder, &with(reference), &[word, "--reference"]);
+    for (reference, word) in [("1.exr,2.exr,1.exr", "independent"), ("1.exr,none.exr", "none.exr")] {
+        refused(folder, &with(reference), &[word]);
     }
 }
 

@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 /// What is measured against.
 #[derive(Clone, Debug)]
 pub(super) struct Reference {
-    /// Both halves, or the whole where there are none.
-    images: Vec<Image>,
+    /// Its parts, independent of each other and equally good: at least one.
+    parts: Vec<Image>,
     /// What is known about it.
     pub(super) facts: Facts,
 }
@@ -25,20 +25,27 @@ pub(super) struct Reference {
 pub(super) struct Facts {
     /// Where it comes from.
     pub(super) origin: String,
-    /// Samples per pixel, those of both halves together; `None` if unknown.
+    /// Samples per pixel, those of all parts together; `None` if unknown.
     pub(super) spp: Option<u64>,
     /// How errors are measured against it, for people.
     pub(super) estimator: &'static str,
 }
 
-/// [`ImageError::against_halves`].
-const BY_HALVES: &str = "cross product of two independent halves: noise of the reference adds no offset";
+/// How [`ImageError::against_parts`] measures with so many parts.
+fn estimator(parts: usize) -> &'static str {
+    match parts {
+        1 => "plain: noise of the reference counts as error",
+        2 => {
+            "cross product of two independent parts, relative to their mean: noise of the reference adds an offset where it is large"
+        }
+        _ => {
+            "cross products of two of the independent parts, relative to the others: noise of the reference adds no offset"
+        }
+    }
+}
 
-/// [`ImageError::between`].
-const PLAIN: &str = "plain: noise of the reference counts as error";
-
-/// Seeds of the halves. References draw other random numbers than any run: an error shared by both would not be seen.
-const SEEDS: [u64; 2] = [0x9E37_79B9_7F4A_7C15, 0xD1B5_4A32_D192_ED03];
+/// Seeds of the parts. References draw other random numbers than any run: an error shared by both would not be seen.
+const SEEDS: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xD1B5_4A32_D192_ED03, 0x8CB9_2BA7_2F3D_8DD7];
 
 /// The user's cache folder for references, or one below `output` where there is none.
 pub(super) fn default_cache(output: &Path) -> PathBuf {
@@ -46,32 +53,33 @@ pub(super) fn default_cache(output: &Path) -> PathBuf {
 }
 
 impl Reference {
-    /// Reads one that the user has: one image, or two that are independent of each other.
+    /// Reads one that the user has: one image, or several that are independent of each other.
     ///
     /// # Errors
-    /// If one cannot be read, or has another size than the runs; if there are more than two.
+    /// If one cannot be read, or has another size than the runs; if two are the same.
     pub(super) fn read(paths: &[PathBuf], settings: &Settings) -> Result<Self> {
-        let images = paths.iter().map(|path| read_one(path, settings));
-        let images = images.collect::<Result<Vec<Image>>>()?;
-        let estimator = match images.as_slice() {
-            [_] => PLAIN,
-            [a, b] if a.pixels == b.pixels => {
-                bail!("--reference: the two images are the same: give independent ones, or one")
+        let parts = paths.iter().map(|path| read_one(path, settings));
+        let parts = parts.collect::<Result<Vec<Image>>>()?;
+        for (k, part) in parts.iter().enumerate() {
+            if let Some(j) = parts[..k].iter().position(|other| other.pixels == part.pixels) {
+                bail!(
+                    "--reference: {} and {} are the same image: give independent ones, rendered with other seeds, or one",
+                    paths[j].display(),
+                    paths[k].display()
+                );
             }
-            [_, _] => BY_HALVES,
-            _ => bail!("--reference is one image or two, {} are given", images.len()),
-        };
+        }
         let names: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
         let facts = Facts {
-            origin: names.join(" and "),
+            origin: names.join(", "),
             spp: None,
-            estimator,
+            estimator: estimator(parts.len()),
         };
-        Ok(Self { images, facts })
+        Ok(Self { parts, facts })
     }
 
-    /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to an even number), half of them
-    /// in each of two images with different seeds, and puts it there; `None` if interrupted.
+    /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to a multiple of three), a third of them
+    /// in each of three images with different seeds, and puts it there; `None` if interrupted.
     ///
     /// # Errors
     /// Settings out of range, a cache that cannot be written.
@@ -83,9 +91,9 @@ impl Reference {
         cache: &Path,
         watch: &Watch,
     ) -> Result<Option<Self>> {
-        let each = spp.div_ceil(2);
-        let mut images = Vec::with_capacity(SEEDS.len());
-        for (half, seed) in (1..).zip(SEEDS) {
+        let each = spp.div_ceil(SEEDS.len() as u64);
+        let mut parts = Vec::with_capacity(SEEDS.len());
+        for (number, seed) in (1..).zip(SEEDS) {
             let settings = Settings {
                 method: Method::Exact,
                 seed,
@@ -97,7 +105,7 @@ impl Reference {
             };
             let path = cache.join(key(scene, camera, &settings, each)? + ".exr");
             if let Ok(kept) = image::read_exr(&path) {
-                images.push(kept);
+                parts.push(kept);
                 continue;
             }
             let mut frames = session::start(scene, camera, &settings)?;
@@ -107,8 +115,9 @@ impl Reference {
                 target_error: None,
             };
             let what = format!(
-                "reference of {}, half {half} of 2, kept for next time",
-                scene.parts.name
+                "reference of {}, part {number} of {}, kept for next time",
+                scene.parts.name,
+                SEEDS.len()
             );
             session::render_frames(frames.as_mut(), budget, watch, &what, |_| {})?;
             if watch.stopped() {
@@ -118,33 +127,33 @@ impl Reference {
             std::fs::create_dir_all(cache)
                 .with_context(|| format!("{}: cannot make the cache folder", cache.display()))?;
             image::write_exr(&path, image.width, image.height, &Channel::rgb("", &image), &[])?;
-            images.push(image);
+            parts.push(image);
         }
         let facts = Facts {
-            origin: format!("exact, 2 x {each} samples per pixel, manylight {}", machine::VERSION),
-            spp: Some(2 * each),
-            estimator: BY_HALVES,
+            origin: format!(
+                "exact, {} x {each} samples per pixel, manylight {}",
+                parts.len(),
+                machine::VERSION
+            ),
+            spp: Some(parts.len() as u64 * each),
+            estimator: estimator(parts.len()),
         };
-        Ok(Some(Self { images, facts }))
+        Ok(Some(Self { parts, facts }))
     }
 
-    /// The best picture that there is: the mean of both halves, or the whole.
+    /// The best picture that there is: the mean of the parts.
     pub(super) fn whole(&self) -> Image {
-        let mut mean = self.images[0].clone();
-        if let Some(other) = self.images.get(1) {
-            let pairs = mean.pixels.iter_mut().zip(&other.pixels);
-            pairs.for_each(|(a, b)| *a = std::array::from_fn(|c| 0.5 * (a[c] + b[c])));
+        let share = 1.0 / self.parts.len() as f32;
+        let mut mean = self.parts[0].clone();
+        for (i, pixel) in mean.pixels.iter_mut().enumerate() {
+            *pixel = std::array::from_fn(|c| share * self.parts.iter().map(|part| part.pixels[i][c]).sum::<f32>());
         }
         mean
     }
 
     /// The error of `image`; `None` if it has another size.
     pub(super) fn error(&self, image: &Image) -> Option<ImageError> {
-        match self.images.as_slice() {
-            [a, b] => ImageError::against_halves(image, a, b),
-            [whole] => ImageError::between(image, whole),
-            _ => None,
-        }
+        ImageError::against_parts(image, &self.parts)
     }
 }
 
