@@ -48,7 +48,7 @@ fn a_benchmark_writes_its_files_and_keeps_its_reference() {
     assert_eq!(summary["scenes"][0]["samplers"][0]["to_uniform"], 1.0);
     assert_eq!(summary["scenes"][0]["samplers"][1]["seeds"], 2);
     let kept = listing(&folder.join("cache"));
-    assert_eq!(kept.len(), 3, "three independent parts");
+    assert_eq!(kept.len(), 2, "two independent parts");
     assert_eq!(manylight(folder, &arguments).status.code(), Some(0));
     assert_eq!(listing(&folder.join("cache")), kept, "the reference is used again");
 }

@@ -46,10 +46,10 @@ Examples:
 Every run learns from scratch. Errors are measured against `exact` (all lights at every point), rendered once and cached;
 measuring is not counted as time, building the light structures and learning are. The runs of a scene take turns frame
 by frame, so that a busy machine slows all of them alike.
-The reference is three independent images. The error of x is the mean of (x - a)(x - b) / (c^2 + 0.01 mean(r)^2) over the three ways to
-choose a, b and c among them, r being their mean, averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
-error, but adds no offset. Efficiency is 1 / (error x seconds), at the latest time at which the
-errors of all samplers stand out of the reference's noise.
+The reference is two independent images a and b. The error of x is (x - a)(x - b) / (r^2 + 0.01 mean(r)^2), r = (a + b) / 2,
+averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
+error, but adds no offset. With bounces all pixels of a reference are noisy, and r is a third image: the mean over the three ways to choose it. Efficiency is 1 / (error x seconds),
+at the latest time at which the errors of all samplers stand out of the reference's noise.
 oracle draws one light per pixel with the best possible probabilities; finding them is not counted as time, so compare it
 at equal samples.
 Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
@@ -80,13 +80,13 @@ pub(crate) struct BenchArgs {
     /// Runs per sampler, each with another seed; tables show medians and the spread
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
     seeds: u32,
-    /// Samples per pixel of the reference, a third of them in each of its three images
+    /// Samples per pixel of the reference, shared by its two images (with bounces three)
     ///
     /// Higher values tell smaller errors apart; lower values are done sooner.
-    #[arg(long, value_name = "N", default_value_t = 18, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..))]
     reference_spp: u64,
-    /// Use this image (.exr) as the reference, whose noise then counts as error; or three and more that are independent of each other (other seeds),
-    /// whose noise does not. With one scene only
+    /// Use this image (.exr) as the reference, whose noise then counts as error; or several that are independent of each other (other seeds),
+    /// whose noise does not: two for direct light, three with bounces. With one scene only
     #[arg(long, value_name = "FILE[,FILE...]", value_delimiter = ',')]
     reference: Vec<PathBuf>,
     /// Folder in which references are kept; default: the user's cache folder

@@ -44,6 +44,13 @@ fn estimator(parts: usize) -> &'static str {
     }
 }
 
+/// In how many parts references come. Where paths bounce all pixels are noisy, and what makes errors relative must be independent of the rest, or noise counts
+/// as error. In direct light `exact` is noisy at the borders of lamps only, where a third part that misses the lamp would weigh the error of a pixel too much by far:
+/// there the mean of two does better.
+fn part_count(settings: &Settings) -> usize {
+    if settings.max_bounces > 0 { 3 } else { 2 }
+}
+
 /// Seeds of the parts. References draw other random numbers than any run: an error shared by both would not be seen.
 const SEEDS: [u64; 3] = [0x9E37_79B9_7F4A_7C15, 0xD1B5_4A32_D192_ED03, 0x8CB9_2BA7_2F3D_8DD7];
 
@@ -78,8 +85,8 @@ impl Reference {
         Ok(Self { parts, facts })
     }
 
-    /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to a multiple of three), a third of them
-    /// in each of three images with different seeds, and puts it there; `None` if interrupted.
+    /// Takes it from the cache, or renders it with `spp` samples per pixel (rounded up to as many in each part),
+    /// each part with a seed of its own, and puts it there; `None` if interrupted.
     ///
     /// # Errors
     /// Settings out of range, a cache that cannot be written.
@@ -91,9 +98,10 @@ impl Reference {
         cache: &Path,
         watch: &Watch,
     ) -> Result<Option<Self>> {
-        let each = spp.div_ceil(SEEDS.len() as u64);
-        let mut parts = Vec::with_capacity(SEEDS.len());
-        for (number, seed) in (1..).zip(SEEDS) {
+        let count = part_count(settings);
+        let each = spp.div_ceil(count as u64);
+        let mut parts = Vec::with_capacity(count);
+        for (number, &seed) in (1..).zip(&SEEDS[..count]) {
             let settings = Settings {
                 method: Method::Exact,
                 seed,
@@ -115,9 +123,8 @@ impl Reference {
                 target_error: None,
             };
             let what = format!(
-                "reference of {}, part {number} of {}, kept for next time",
-                scene.parts.name,
-                SEEDS.len()
+                "reference of {}, part {number} of {count}, kept for next time",
+                scene.parts.name
             );
             session::render_frames(frames.as_mut(), budget, watch, &what, |_| {})?;
             if watch.stopped() {
