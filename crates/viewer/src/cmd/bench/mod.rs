@@ -48,8 +48,9 @@ measuring is not counted as time, building the light structures and learning are
 by frame, so that a busy machine slows all of them alike.
 The reference is two independent images a and b. The error of x is (x - a)(x - b) / (r^2 + 0.01 mean(r)^2), r = (a + b) / 2,
 averaged over the pixels but for the 0.1 % where its magnitude is largest: noise of the reference widens its standard
-error, but adds no offset. With bounces all pixels of a reference are noisy, and r is a third image: the mean over the three ways to choose it. Efficiency is 1 / (error x seconds),
-at the latest time at which the errors of all samplers stand out of the reference's noise.
+error, and adds an offset only where it is so large that r is uncertain. With bounces it is, in all pixels: r is a third
+image there, and the error the mean over the three ways to choose it. Efficiency is 1 / (error x seconds), at the latest
+time at which the errors of all samplers stand out of the reference's noise.
 oracle draws one light per pixel with the best possible probabilities; finding them is not counted as time, so compare it
 at equal samples.
 Writes frames.csv, summary.json, setup.md and plots (SVG) to the output folder, and a table to stdout.")]
