@@ -8,6 +8,7 @@
 
 mod bounces;
 mod choosing;
+mod clean;
 mod control;
 mod direct;
 pub mod error;
@@ -27,6 +28,7 @@ mod restir;
 pub mod settings;
 
 pub use choosing::Choosing;
+pub use clean::{Cleaned, Cleaner, Projection};
 pub use error::{GpuFault, RenderError};
 pub use film::{ErrorEstimate, Film, Image, SampleCounts};
 pub use flip::flip;
