@@ -1,4 +1,4 @@
-//! From a scene to an image: the integrators, the film, image files and error metrics.
+//! From a scene to an image: the integrators, the film, pictures for the eyes, image files and error metrics.
 //!
 //! [`renderer`] gives an object that renders one frame (one sample per pixel) at a time into its [`Film`]; the caller
 //! decides when to stop. `exact` is a sibling of the samplers: it sums over all lights and uses no cache, and

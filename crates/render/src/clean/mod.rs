@@ -12,6 +12,8 @@ mod resolve;
 
 pub use projection::Projection;
 
+pub(crate) use filter::STEPS;
+
 use crate::Film;
 use frame::Frame;
 use glam::Vec3;

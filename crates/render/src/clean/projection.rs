@@ -6,9 +6,9 @@ use scene::Camera;
 /// A camera the other way round: from the world to shares of a picture's width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projection {
-    camera_from_world: Affine3A,
+    pub(crate) camera_from_world: Affine3A,
     /// Half of the picture's width and height at unit distance.
-    half: Vec2,
+    pub(crate) half: Vec2,
 }
 
 impl Projection {
