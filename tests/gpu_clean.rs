@@ -110,7 +110,7 @@ fn pictures_are_those_of_the_cpu() {
     both.show("first", 1);
     both.show("refined", 1);
     both.show("refined again", 3);
-    for step in 0..6 {
+    for step in 0..3 {
         both.go(0.03, 0.01);
         both.show(&format!("step {step}"), 1);
     }

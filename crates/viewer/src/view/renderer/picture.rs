@@ -56,7 +56,7 @@ impl Worker {
                     ..made
                 },
                 bytes_read: bytes_read.saturating_sub(stage.bytes_read),
-                rays_per_s: (rays - stage.rays) as f64
+                rays_per_s: rays.saturating_sub(stage.rays) as f64
                     / stage.published.map_or(stage.seconds, |at| at.elapsed().as_secs_f64()),
                 cells: sampler.cells,
                 sampler_bytes: sampler.bytes,

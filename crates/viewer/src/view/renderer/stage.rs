@@ -24,7 +24,7 @@ pub(super) struct Stage {
     pub(super) importance_told: Option<Instant>,
     /// Rays traced until the last picture.
     pub(super) rays: u64,
-    /// Bytes read back from the device until then.
+    /// Bytes read back from the device until then, for whatever.
     pub(super) bytes_read: u64,
     /// What the last frames took.
     pub(super) seconds: f64,
@@ -59,7 +59,7 @@ impl Worker {
             published: None,
             importance_told: None,
             rays: 0,
-            bytes_read: 0,
+            bytes_read: self.device.bytes_read(),
             seconds: 0.0,
             showing: Duration::ZERO,
             learned: [0.0; 2],
