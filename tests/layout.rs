@@ -2,7 +2,8 @@
 
 use light_cache::Scheme;
 use render::gpu::{
-    AovPixel, FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run, files, link,
+    AovPixel, CleanParams, Count, FilmPixel, FrameParams, GuidePixel, KnownPixel, LessonCounters, LessonParams,
+    PackedObservation, PixelControl, Run, Seen, TintPixel, files, link,
 };
 use scene::packed::{PackedLight, SceneParams};
 use std::mem::offset_of;
@@ -57,6 +58,14 @@ fn records_lie_alike_in_memory() {
     same_layout!(module, "LessonParams", LessonParams: frame, stride, pad0, pad1);
     same_layout!(module, "LessonCounters", LessonCounters: observed, kept, runs, pad);
     same_layout!(module, "Run", Run: frame, tile, first, count);
+    let module = &self::module("split", Scheme::Uniform, false);
+    same_layout!(module, "Seen", Seen: x_axis, half_width, y_axis, half_height, z_axis, width, translation, height);
+    same_layout!(module, "CleanParams", CleanParams: now, before, spp, pixel_size, variance_scale, pad);
+    same_layout!(module, "Guide", GuidePixel: normal, footprint, position, depth);
+    same_layout!(module, "Tint", TintPixel: reflected, pad0, added, pad1);
+    same_layout!(module, "Known", KnownPixel: irradiance, luminance_sq, samples, spread, pad0, pad1);
+    let module = &self::module("count", Scheme::Uniform, false);
+    same_layout!(module, "Count", Count: rays_nearest, rays_occluded, nonfinite);
 }
 
 #[test]
@@ -64,7 +73,10 @@ fn passes_are_valid_and_keep_to_the_default_limits() {
     use wgpu::naga::valid::{Capabilities, ValidationFlags, Validator};
     let schemes = [Scheme::Uniform, Scheme::Discrete, Scheme::Tree, Scheme::Adaptive];
     let paths = schemes.map(|scheme| [false, true].map(|aovs| ("path", scheme, aovs)));
-    let others = ["tally", "thin"].map(|pass| (pass, Scheme::Uniform, false));
+    let others = [
+        "tally", "thin", "split", "recall", "vary", "atrous", "assemble", "typical", "resolve", "mean", "count",
+    ];
+    let others = others.map(|pass| (pass, Scheme::Uniform, false));
     for (pass, scheme, aovs) in paths.into_iter().flatten().chain(others) {
         let module = module(pass, scheme, aovs);
         let valid = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
@@ -100,4 +112,49 @@ fn every_twin_is_still_there() {
         }
     }
     assert!(twins > 50, "only {twins} twins were found");
+}
+
+/// The value of the constant `name` in Rust or WGSL, as it is written but for the types of its numbers.
+fn constant(source: &str, name: &str) -> Option<String> {
+    let start = format!("const {name}: ");
+    let (_, value) = source[source.find(&start)? + start.len()..].split_once(" = ")?;
+    let (value, _) = value.split_once(';')?;
+    let words = value.replace('_', "");
+    let bare = |word: &str| match word.strip_suffix('u') {
+        Some(number) if number.starts_with(|c: char| c.is_ascii_digit()) => number.to_owned(),
+        _ => word.to_owned(),
+    };
+    Some(words.split(' ').map(bare).collect::<Vec<_>>().join(" "))
+}
+
+#[test]
+fn constants_have_the_same_values() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut compared = 0;
+    for (file, text) in files() {
+        for (at, _) in text.match_indices("// twin: ") {
+            let lines = &text[at..];
+            let twin = lines
+                .lines()
+                .next()
+                .and_then(|line| line["// twin: ".len()..].split_once(' '));
+            let (path, name) = twin.unwrap_or_else(|| panic!("{file}: a twin without a name"));
+            let Some(definition) = lines.lines().find(|line| !line.starts_with("//")) else {
+                continue;
+            };
+            // Integers of 64 bits are spelled as two halves.
+            let shader_name = definition.strip_prefix("const ").and_then(|rest| rest.split_once(": "));
+            let Some((shader_name, _)) = shader_name.filter(|(_, rest)| !rest.starts_with("vec2<u32>")) else {
+                continue;
+            };
+            let source = std::fs::read_to_string(root.join(path)).unwrap_or_else(|_| panic!("{file}: no file {path}"));
+            let [shader, rust] = [constant(definition, shader_name), constant(&source, name)];
+            assert!(
+                shader.is_some() && shader == rust,
+                "{file} {name}: {shader:?}, {path}: {rust:?}"
+            );
+            compared += 1;
+        }
+    }
+    assert!(compared > 40, "only {compared} constants were compared");
 }

@@ -12,6 +12,8 @@ mod deferred;
 mod gpu;
 /// Its auxiliary images.
 mod gpu_aovs;
+/// Pictures for the eyes that it makes of its film.
+mod gpu_clean;
 /// Records that Rust and the shaders share.
 mod layout;
 /// Placed meshes and holes on the GPU back end.

@@ -261,10 +261,14 @@ fn the_window_shows_what_the_gpu_renders() {
         "{}",
         stderr(&output)
     );
-    for (report, expected) in [("gpu", "gpu"), ("cpu", "cpu"), ("lost", "cpu"), ("again", "gpu")] {
-        let text = std::fs::read_to_string(folder.join(report).with_extension("json")).expect("a report");
+    for (file, expected) in [("gpu", "gpu"), ("cpu", "cpu"), ("lost", "cpu"), ("again", "gpu")] {
+        let text = std::fs::read_to_string(folder.join(file).with_extension("json")).expect("a report");
         let report: Value = serde_json::from_str(&text).expect("JSON");
         assert_eq!(report["rendered_on"], expected, "{text}");
+        // The image alone, or all sums of a pixel for a view of auxiliary images; nothing of the CPU's.
+        let per_pixel = report["bytes_read"].as_u64().expect("a number") / (160 * 120);
+        let read = [("gpu", 208), ("again", 16)].iter().find(|(name, _)| *name == file);
+        assert_eq!(per_pixel, read.map_or(0, |(_, bytes)| *bytes), "{text}");
     }
     let [gpu, cpu] = ["gpu.png", "cpu.png"].map(|name| decode(&folder.join(name)));
     let apart: u64 = gpu.iter().zip(&cpu).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();

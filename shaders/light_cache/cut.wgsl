@@ -16,7 +16,7 @@ const CUT_CUBE_BITS: u32 = 23u;
 // twin: crates/light-cache/src/adaptive/weights.rs LANES
 const LANES: u32 = 16u;
 // twin: crates/light-cache/src/adaptive/branch.rs LIGHT
-const LIGHT_BRANCH: u32 = 0x80000000u;
+const LIGHT_BRANCH: u32 = 1u << 31u;
 const DISTANT_BRANCH: u32 = 0xffffffffu;
 const NO_FACTORS: u32 = 0xffffffffu;
 

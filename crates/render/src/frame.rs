@@ -4,13 +4,14 @@
 use crate::choosing::Choosing;
 use crate::direct::OneLight;
 use crate::exact::AllLights;
-use crate::gpu::PassTime;
+use crate::gpu::{DeviceFilm, PassTime};
 use crate::oracle::Oracle;
 use crate::restir::Restir;
 use crate::{Film, Method, RenderError, Settings};
 pub(crate) use drawn::Drawn;
+pub(crate) use frames::Frames;
 use light_cache::{CellRecord, LightRecord, LightSampler, Recording, SamplerKind, SamplerStats, ShadingPoint, Visitor};
-pub(crate) use rendering::{Eye, Frames, Rendering};
+pub(crate) use rendering::{Eye, Rendering};
 use scene::{Camera, Scene};
 pub use state::film_of;
 use std::ops::Deref;
@@ -101,6 +102,12 @@ pub trait FrameLoop<'s>: Send {
 
     /// What has been accumulated. What a device holds is read back when it is asked for.
     fn film(&self) -> &Film;
+
+    /// What a device has accumulated, for [`crate::gpu::Cleaner`]: nothing is read back for that, nor for counters from then on. `None` for
+    /// the CPU, and before the first frame.
+    fn device_film(&self) -> Option<DeviceFilm<'_>> {
+        None
+    }
 
     /// Width and height of the film, which is not read back for that.
     fn size(&self) -> (u32, u32);
@@ -267,6 +274,7 @@ impl<'s> Visitor for Starter<'s, '_> {
 }
 
 mod drawn;
+mod frames;
 mod rendering;
 mod state;
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! From a scene to an image: the integrators, the film, image files and error metrics.
+//! From a scene to an image: the integrators, the film, pictures for the eyes, image files and error metrics.
 //!
 //! [`renderer`] gives an object that renders one frame (one sample per pixel) at a time into its [`Film`]; the caller
 //! decides when to stop. `exact` is a sibling of the samplers: it sums over all lights and uses no cache, and
@@ -8,6 +8,7 @@
 
 mod bounces;
 mod choosing;
+mod clean;
 mod control;
 mod direct;
 pub mod error;
@@ -27,6 +28,7 @@ mod restir;
 pub mod settings;
 
 pub use choosing::Choosing;
+pub use clean::{Cleaned, Cleaner, Projection};
 pub use error::{GpuFault, RenderError};
 pub use film::{ErrorEstimate, Film, Image, SampleCounts};
 pub use flip::flip;

@@ -10,7 +10,6 @@
 #[cfg(unix)]
 mod allocator;
 mod camera_path;
-mod clean;
 mod cli;
 mod cmd;
 mod exit;

@@ -207,6 +207,13 @@ impl Film {
         [0, 1].map(|i| self.weights[i] - self.earlier_weights[i])
     }
 
+    /// The variance of the current block's mean over that of a sample, where every pixel has one sample per frame: 1 / n for n frames of
+    /// the same weight.
+    pub(crate) fn even_share(&self) -> f64 {
+        let [sum, squares] = self.block_weights();
+        squares / (sum * sum)
+    }
+
     /// The regulariser of relative squared errors.
     fn offset(&self) -> f64 {
         let luminances = self.to_rows(0.0, |tile, i| self.mean(tile, i).luminance());
@@ -220,9 +227,7 @@ impl Film {
         if pixel.count == 0 {
             return Mean::NONE;
         }
-        let [sum, squares] = self.block_weights();
-        // 1 / n for n frames of the same weight, with one sample each.
-        let even = squares / (sum * sum);
+        let even = self.even_share();
         let scale = 1.0 / pixel.weight;
         Mean {
             values: pixel.sums.map(|value| value * scale),

@@ -2,6 +2,7 @@
 
 use super::device::Gpu;
 use crate::RenderError;
+use std::sync::atomic::Ordering;
 use wgpu::BufferUsages;
 
 /// Least size of a buffer: bindings of nothing are not allowed.
@@ -79,5 +80,6 @@ pub(super) fn read_start<T>(gpu: &Gpu, buffer: &wgpu::Buffer, size: usize, look:
         return None;
     }
     let bytes = copy.get_mapped_range(..).ok()?;
+    gpu.read.fetch_add(size as u64, Ordering::Relaxed);
     Some(look(&bytes))
 }

@@ -4,6 +4,7 @@ use super::pipelines::{Compiled, PipelineFile};
 use crate::RenderError;
 use crate::error::GpuFault;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::Features;
 
@@ -62,6 +63,8 @@ pub struct Gpu {
     info: AdapterInfo,
     pub(super) pipelines: Option<PipelineFile>,
     pub(super) compiled: Compiled,
+    /// See [`Gpu::bytes_read`].
+    pub(super) read: AtomicU64,
     /// What has gone wrong since, the first of it.
     fault: Arc<Mutex<Option<GpuFault>>>,
 }
@@ -128,6 +131,7 @@ impl Gpu {
             info: info.into(),
             pipelines,
             compiled: Compiled::default(),
+            read: AtomicU64::new(0),
             fault,
         }))
     }
@@ -135,6 +139,11 @@ impl Gpu {
     /// Which adapter it is.
     pub fn info(&self) -> &AdapterInfo {
         &self.info
+    }
+
+    /// Bytes that were copied from the device to the processor since it was opened.
+    pub fn bytes_read(&self) -> u64 {
+        self.read.load(Ordering::Relaxed)
     }
 
     /// Whether it binds as many buffers at a time as auxiliary images need.

@@ -1,11 +1,12 @@
 //! Frames on the device, and learning from them.
 
+use super::count::CountPass;
 use super::device::Gpu;
 use super::layout::FrameParams;
 use super::lessons::{LessonPasses, read_all};
 use super::path_pass::PathPass;
 use super::refusal;
-use super::target::Target;
+use super::target::{DeviceFilm, Target};
 use super::timing::{Pass, PassTime, Timer};
 use crate::direct::OneLight;
 use crate::frame::{Drawn, Eye, Frames};
@@ -35,6 +36,10 @@ pub(super) struct GpuFrames<S> {
     counted: Counters,
     /// What the device has accumulated, since somebody asked.
     film: OnceCell<(Film, Counters)>,
+    /// What its pixels have counted, likewise.
+    counts: OnceCell<Counters>,
+    /// Once somebody has made do without the film; `None` in it: the device is lost.
+    count_pass: OnceCell<Option<CountPass>>,
     failure: Option<RenderError>,
     /// Whether the CPU would guide bounces.
     unguided: bool,
@@ -63,6 +68,8 @@ impl<S: LightSampler> GpuFrames<S> {
             controls: FrameParams::CONTROLS_NEW,
             counted: Counters::default(),
             film: OnceCell::new(),
+            counts: OnceCell::new(),
+            count_pass: OnceCell::new(),
             failure: None,
         };
         match frames.gpu.error() {
@@ -84,7 +91,7 @@ impl<S: LightSampler> GpuFrames<S> {
             return Ok(());
         }
         self.counted = Frames::counters(self, film);
-        self.film = OnceCell::new();
+        self.accumulated();
         // What the sampler has not learned from yet is not lost.
         let before = self.target.take().and_then(|target| target.lessons);
         let kept = before.map_or_else(Vec::new, |lessons| lessons.into_kept(&self.gpu));
@@ -186,6 +193,11 @@ impl<S: LightSampler> GpuFrames<S> {
         self.gpu.error().unwrap_or_else(|| self.gpu.gone())
     }
 
+    /// What was read is no longer all.
+    fn accumulated(&mut self) {
+        (self.film, self.counts) = (OnceCell::new(), OnceCell::new());
+    }
+
     /// What the device has accumulated, read once after every frame; `film` has the frames' number and weights.
     fn read_once(&self, film: &Film) -> &(Film, Counters) {
         self.film.get_or_init(|| match &self.target {
@@ -225,7 +237,7 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
             Ok(())
         };
         self.target = Some(target);
-        self.film = OnceCell::new();
+        self.accumulated();
         self.failure = result.err();
         (Counters::default(), self.failure.is_none())
     }
@@ -250,7 +262,22 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
     }
 
     fn counters(&self, film: &Film) -> Counters {
-        self.counted + self.read_once(film).1
+        let of_target = match (self.film.get(), self.count_pass.get(), &self.target) {
+            (None, Some(Some(pass)), Some(target)) => {
+                *(self.counts).get_or_init(|| pass.run(&self.gpu, &target.film).unwrap_or_default())
+            }
+            _ => self.read_once(film).1,
+        };
+        self.counted + of_target
+    }
+
+    fn device_film(&self, film: &Film) -> Option<DeviceFilm<'_>> {
+        // The device clears what it has with the next frame.
+        if film.spp() == 0 {
+            return None;
+        }
+        self.count_pass.get_or_init(|| CountPass::new(&self.gpu).ok());
+        Some(self.target.as_ref()?.on_device(&self.gpu, film))
     }
 
     fn error(&self) -> Option<RenderError> {

@@ -4,12 +4,15 @@
 //! `shaders/pass/path.wgsl`, whose functions are twins of those in `path.rs` and `direct.rs`. The random numbers are the same
 //! integers, and samplers draw from the same tables, so both back ends draw the same lights; images differ by rounding. The film stays on the
 //! device until somebody looks at it. Samplers learn on the CPU, from observations that the device has written down and thinned; they are
-//! read when an epoch is over, and what was learned is uploaded.
+//! read when an epoch is over, and what was learned is uploaded. Pictures for the eyes are made there too ([`Cleaner`]), so that windows need not
+//! read the film.
 //!
 //! Needs WebGPU's default limits and no feature; larger limits are used where the adapter has them. Auxiliary images alone need one storage
 //! buffer more than the default.
 
 mod buffers;
+mod clean;
+mod count;
 mod device;
 mod frames;
 mod kernel;
@@ -22,12 +25,15 @@ mod shader;
 mod target;
 mod timing;
 
+pub use clean::{CleanParams, Cleaner, DevicePicture, GuidePixel, KnownPixel, Seen, TintPixel};
+pub use count::Count;
 pub use device::{AdapterInfo, Gpu, adapters};
 pub use kernel::Kernel;
 pub use layout::{
     AovPixel, FilmPixel, FrameParams, LessonCounters, LessonParams, PackedObservation, PixelControl, Run,
 };
 pub use shader::{files, link};
+pub use target::DeviceFilm;
 pub use timing::PassTime;
 
 use crate::frame::{Rendering, SceneRef};

@@ -7,10 +7,37 @@ use super::lessons::{LessonPasses, Lessons};
 use super::path_pass::PathPass;
 use crate::path::Counters;
 use crate::{Film, RenderError};
+use std::sync::Arc;
+
+/// What a rendering has accumulated, as it lies on its device.
+pub struct DeviceFilm<'f> {
+    pub(super) gpu: &'f Arc<Gpu>,
+    /// [`FilmPixel`]s.
+    pub(super) film: &'f wgpu::Buffer,
+    /// [`AovPixel`]s; `None` where there are no auxiliary images.
+    pub(super) aovs: Option<&'f wgpu::Buffer>,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Samples per pixel.
+    pub(super) spp: u64,
+    /// The variance of a pixel's mean over what its samples' mean square exceeds its own square by; 0 for one sample.
+    pub(super) variance_scale: f32,
+}
+
+impl DeviceFilm<'_> {
+    /// Why the device does not work any more, if so.
+    pub fn fault(&self) -> Option<RenderError> {
+        self.gpu.error()
+    }
+
+    pub(super) fn pixels(&self) -> u64 {
+        u64::from(self.width) * u64::from(self.height)
+    }
+}
 
 /// What a frame of one size writes.
 pub(super) struct Target {
-    film: wgpu::Buffer,
+    pub(super) film: wgpu::Buffer,
     pub(super) observations: wgpu::Buffer,
     /// `None` where no auxiliary images are asked for.
     aovs: Option<wgpu::Buffer>,
@@ -65,6 +92,24 @@ impl Target {
     /// Whether frames of this size, with these layers, write to it.
     pub(super) fn is_for(&self, size: [u32; 3], aovs: bool) -> bool {
         self.size == size && self.aovs.is_some() == aovs
+    }
+
+    /// What the device has accumulated, as it lies there; `film` has the number and the weights of the frames.
+    pub(super) fn on_device<'t>(&'t self, gpu: &'t Arc<Gpu>, film: &Film) -> DeviceFilm<'t> {
+        let share = film.even_share();
+        DeviceFilm {
+            gpu,
+            film: &self.film,
+            aovs: self.aovs.as_ref(),
+            width: self.size[0],
+            height: self.size[1],
+            spp: film.spp(),
+            variance_scale: if film.spp() > 1 {
+                (share / (1.0 - share)) as f32
+            } else {
+                0.0
+            },
+        }
     }
 
     /// What the device has accumulated; `film` has the number and the weights of the frames. Nothing of a device that is lost.

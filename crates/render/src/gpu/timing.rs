@@ -3,23 +3,36 @@
 use super::buffers::read;
 use super::device::Gpu;
 
-/// A pass of a frame.
+/// A pass of a frame, or a stage of a picture for the eyes, which has several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     Path,
     Tally,
     Thin,
+    History,
+    Filter,
+    Resolve,
 }
 
 impl Pass {
-    const ALL: [Self; 3] = [Self::Path, Self::Tally, Self::Thin];
+    const ALL: [Self; 6] = [
+        Self::Path,
+        Self::Tally,
+        Self::Thin,
+        Self::History,
+        Self::Filter,
+        Self::Resolve,
+    ];
 
-    /// The name of its file and of its entry point.
+    /// The name of a pass's file and of its entry point, or of the stage.
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::Path => "path",
             Self::Tally => "tally",
             Self::Thin => "thin",
+            Self::History => "history",
+            Self::Filter => "filter",
+            Self::Resolve => "resolve",
         }
     }
 
@@ -47,7 +60,7 @@ const QUERIES: u32 = 2 * Pass::ALL.len() as u32;
 /// The time that one pass took.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct PassTime {
-    /// Its name: that of its file in `shaders/pass`.
+    /// Its name: that of its file in `shaders/pass`, or of the stage that it is part of.
     pub name: String,
     /// Frames in which it ran and was timed.
     pub frames: u64,
@@ -57,7 +70,7 @@ pub struct PassTime {
     pub max_ms: f64,
 }
 
-/// A clock for the passes of a frame. It is read after every frame, which then cannot overlap the next.
+/// A clock for the passes of a frame or a picture. It is read after every one, which then cannot overlap the next.
 #[derive(Debug)]
 pub(super) struct Timer {
     queries: wgpu::QuerySet,
@@ -97,25 +110,30 @@ impl Timer {
         })
     }
 
-    /// Adds to the end of a frame what makes its times readable; `passes` ran, the first of [`Pass::ALL`].
+    /// Adds to the end of a frame what makes its times readable; `passes` ran, which follow each other in [`Pass::ALL`].
     pub(super) fn resolve(&self, encoder: &mut wgpu::CommandEncoder, passes: &[Pass]) {
-        encoder.resolve_query_set(&self.queries, 0..2 * passes.len() as u32, &self.ticks, 0);
+        let first = 2 * passes[0] as u32;
+        let queries = first..first + 2 * passes.len() as u32;
+        encoder.resolve_query_set(&self.queries, queries, &self.ticks, 0);
     }
 
-    /// Takes note of a frame in which `passes` ran, the first of [`Pass::ALL`].
-    pub(super) fn note(&mut self, gpu: &Gpu, passes: &[Pass]) {
+    /// Takes note of a frame in which `passes` ran, as told to [`Timer::resolve`]. Returns their milliseconds; none if the device is lost.
+    pub(super) fn note(&mut self, gpu: &Gpu, passes: &[Pass]) -> Vec<f64> {
         let ticks: Option<Vec<u64>> = read(gpu, &self.ticks, bytemuck::pod_collect_to_vec);
-        let Some(ticks) = ticks else { return };
+        let ms_of = |ticks: &[u64]| ticks[1].saturating_sub(ticks[0]) as f64 * self.ms_per_tick;
+        let taken: Vec<f64> = (ticks.unwrap_or_default().chunks_exact(2).take(passes.len()))
+            .map(ms_of)
+            .collect();
         if std::mem::take(&mut self.is_first) {
-            return;
+            return taken;
         }
-        for (pass, ticks) in passes.iter().zip(ticks.chunks_exact(2)) {
-            let ms = ticks[1].saturating_sub(ticks[0]) as f64 * self.ms_per_tick;
+        for (pass, &ms) in passes.iter().zip(&taken) {
             let time = &mut self.times[*pass as usize];
             time.frames += 1;
             time.mean_ms += (ms - time.mean_ms) / time.frames as f64;
             time.max_ms = time.max_ms.max(ms);
         }
+        taken
     }
 
     /// Of all passes that ran.

@@ -55,6 +55,8 @@ struct Report {
     input_to_picture_ms: Option<Summary>,
     /// Of the newest picture.
     stages: Stages,
+    /// Read back from the device since the picture before.
+    bytes_read: u64,
 }
 
 impl Driver {
@@ -286,6 +288,7 @@ impl App {
             render_frame_ms: self.times.render.summary(),
             input_to_picture_ms: self.times.latency.summary(),
             stages: self.figures.stages,
+            bytes_read: self.figures.bytes_read,
         };
         output::write(path, (serde_json::to_string_pretty(&report)? + "\n").as_bytes())
     }

@@ -15,9 +15,9 @@ pub(super) use picture::shading_point;
 
 use super::resolution::Resolution;
 use super::views::View;
-use crate::clean::Cleaner;
 use crate::cli::Backend;
 use device::Device;
+use render::Cleaner;
 use render::Settings;
 use stage::Stage;
 use std::cell::Cell;

@@ -34,9 +34,9 @@ pub(super) struct Shown {
 
 impl Shown {
     /// Radiance, to go through the tone curve.
-    pub(super) fn image(pixels: &[Vec3]) -> Self {
+    pub(super) fn radiance(texels: Vec<[f32; 4]>) -> Self {
         Self {
-            texels: pixels.par_iter().map(|pixel| pixel.extend(1.0).to_array()).collect(),
+            texels,
             tone_mapped: true,
             legend: String::new(),
         }
@@ -95,11 +95,7 @@ impl View {
             legend: legend.into(),
         };
         match (self, aovs) {
-            (Self::Image, _) => Shown {
-                texels: texels(&film.image(), |pixel| pixel),
-                tone_mapped: true,
-                legend: String::new(),
-            },
+            (Self::Image, _) => Shown::radiance(texels(&film.image(), |pixel| pixel)),
             (Self::Error, _) => as_is(relative_error(film), "1 %  blue ... white  100 %, logarithmic"),
             (Self::Albedo, Some(aovs)) => as_is(texels(&aovs.albedo, |pixel| pixel), "0 ... 1 per channel"),
             (Self::Normal, Some(aovs)) => {

@@ -3,10 +3,10 @@
 use super::super::app::App;
 use super::super::views::light_color;
 use super::theme;
-use crate::clean::Projection;
 use crate::table;
 use egui::{Align2, Area, Color32, Id, LayerId, Order, Painter, Pos2, Rect, Stroke, vec2};
 use glam::Vec3;
+use render::Projection;
 
 /// Height of a window in which figures and card find room above each other, points.
 const ROOM_FOR_BOTH: f32 = 660.0;

@@ -58,7 +58,7 @@ impl Worker {
         self.received += u64::from(command.asks_for_picture());
         let outcome = match command {
             Command::Scene(scene, camera) => {
-                self.cleaner.forget();
+                self.forget();
                 self.enter(scene.clone(), scene, camera)
             }
             Command::Look(camera, since) => {
@@ -80,7 +80,7 @@ impl Worker {
                 if before == self.settings {
                     Ok(())
                 } else {
-                    self.cleaner.forget();
+                    self.forget();
                     self.begin_anew()
                 }
             }
@@ -132,6 +132,12 @@ impl Worker {
         if let Err(error) = outcome {
             (self.tell)(Report::Trouble(format!("{error:#}")));
         }
+    }
+
+    /// Forgets what earlier pictures knew.
+    fn forget(&mut self) {
+        self.cleaner.forget();
+        self.device.forget();
     }
 
     /// Whether the film keeps auxiliary images.

@@ -4,7 +4,8 @@ use super::messages::Report;
 use crate::cli::Backend;
 use crate::session::{self, BackEnd};
 use anyhow::Result;
-use render::{FrameLoop, Settings};
+use render::gpu::{Cleaner, DevicePicture};
+use render::{FrameLoop, RenderError, Settings};
 use scene::{Camera, Scene};
 use std::sync::Arc;
 use std::time::Duration;
@@ -21,6 +22,8 @@ pub(super) struct Device {
     open: Option<BackEnd>,
     /// Whether the GPU renders what is shown now.
     renders: bool,
+    /// What earlier pictures of the GPU knew, for the eyes.
+    cleaner: Cleaner,
 }
 
 impl Device {
@@ -29,6 +32,7 @@ impl Device {
             wanted,
             open: None,
             renders: false,
+            cleaner: Cleaner::default(),
         }
     }
 
@@ -78,6 +82,44 @@ impl Device {
             None => self.open.insert(BackEnd::open(self.wanted)?).clone(),
         };
         back_end.start(scene.clone(), camera, settings)
+    }
+
+    /// The picture of what `frames` have rendered, made by the device that holds it, without most of its noise if it is to be `clean`; `None` if it is not
+    /// on a device, or if a picture finds no room there.
+    ///
+    /// # Errors
+    /// [`RenderError::Gpu`] if the device is lost.
+    pub(super) fn picture(
+        &mut self,
+        frames: &dyn FrameLoop<'_>,
+        camera: &Camera,
+        clean: bool,
+    ) -> Result<Option<DevicePicture>, RenderError> {
+        let Some(film) = frames.device_film() else {
+            return Ok(None);
+        };
+        let made = if clean {
+            self.cleaner.clean(&film, camera)
+        } else {
+            self.cleaner.image(&film)
+        };
+        match (made, film.fault()) {
+            (_, Some(fault)) => Err(fault),
+            (made, None) => Ok(made.ok()),
+        }
+    }
+
+    /// Forgets what earlier pictures knew: another scene.
+    pub(super) fn forget(&mut self) {
+        self.cleaner.forget();
+    }
+
+    /// Bytes that were read back from the device since it was opened; 0 if there is none.
+    pub(super) fn bytes_read(&self) -> u64 {
+        match &self.open {
+            Some(BackEnd::Gpu(gpu)) => gpu.bytes_read(),
+            _ => 0,
+        }
     }
 
     /// Takes the device away in a moment, whatever it does then, as a driver that fails: for tests.

@@ -110,6 +110,8 @@ pub(in crate::view) struct Figures {
     /// Milliseconds of rendering per picture.
     pub(in crate::view) frame_ms: f64,
     pub(in crate::view) stages: Stages,
+    /// Bytes read back from the device since the picture before.
+    pub(in crate::view) bytes_read: u64,
     pub(in crate::view) rays_per_s: f64,
     pub(in crate::view) cells: usize,
     /// Bytes of what the sampler keeps.
@@ -127,7 +129,7 @@ pub(in crate::view) struct Stages {
     pub(in crate::view) trace_ms: f64,
     /// Learning which lights matter.
     pub(in crate::view) learn_ms: f64,
-    /// Reading back what a device has accumulated.
+    /// Reading back what a device has accumulated, or the picture that it has made of it.
     pub(in crate::view) read_ms: f64,
     /// Taking over what earlier pictures knew.
     pub(in crate::view) history_ms: f64,

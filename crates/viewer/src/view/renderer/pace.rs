@@ -65,10 +65,7 @@ impl Worker {
                 (self.tell)(Report::Trouble(text));
             }
         } else if let Some(error) = error {
-            self.device.give_up(&error.to_string(), &self.tell);
-            if let Err(error) = self.begin_anew() {
-                (self.tell)(Report::Trouble(format!("{error:#}")));
-            }
+            self.go_on_without_device(&error);
             return;
         }
         let seconds = start.elapsed().as_secs_f64();

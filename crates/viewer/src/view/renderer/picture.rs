@@ -6,8 +6,9 @@ use crate::machine;
 use crate::view::views::{Shown, View};
 use glam::{Vec2, Vec3};
 use light_cache::ShadingPoint;
+use rayon::prelude::*;
 use render::image::{self, Channel};
-use render::{Image, Settings};
+use render::{Image, RenderError, Settings};
 use scene::{PrimitiveId, Ray, Scene};
 use std::path::Path;
 use std::sync::PoisonError;
@@ -22,41 +23,40 @@ impl Worker {
     /// Hands the picture over.
     pub(super) fn publish(&mut self) {
         let start = Instant::now();
+        let (shown, made) = match self.shown() {
+            Ok(Some(shown)) => shown,
+            Ok(None) => return,
+            Err(error) => {
+                self.go_on_without_device(&error);
+                return;
+            }
+        };
         let Some(stage) = &mut self.stage else { return };
-        let film = stage.frames.film();
-        let read_ms = start.elapsed().as_secs_f64() * 1e3;
-        let (width, height) = (film.width(), film.height());
+        let (width, height) = stage.frames.size();
         let still = (width, height) == self.window && stage.changed.elapsed() >= REST;
         let learn_ms = stage.learned[1] * 1e3;
-        let mut stages = Stages {
-            trace_ms: stage.seconds * 1e3 - learn_ms,
-            learn_ms,
-            read_ms,
-            ..Stages::default()
-        };
-        let shown = if self.view == View::Image && self.denoise && film.spp() < CLEAN_SPP {
-            let cleaned = self.cleaner.clean(film, &stage.camera);
-            (stages.history_ms, stages.denoise_ms) = (cleaned.history_ms, cleaned.filter_ms);
-            Shown::image(&cleaned.pixels)
-        } else {
-            self.view.of(stage.frames.as_ref())
-        };
         let stats = stage.frames.stats();
         let rays = stats.rays_nearest + stats.rays_occluded;
         let sampler = stats.sampler.unwrap_or_default();
+        let bytes_read = self.device.bytes_read();
         let picture = Picture {
             width,
             height,
             exposure: (self.view == View::Image).then(|| exposure_of(&shown.texels, width, height)),
             shown,
             figures: Figures {
-                spp: film.spp(),
+                spp: stage.frames.spp(),
                 still,
                 on_gpu: self.device.renders(),
                 size: (width, height),
                 frame_ms: stage.seconds * 1e3,
-                stages,
-                rays_per_s: (rays - stage.rays) as f64
+                stages: Stages {
+                    trace_ms: stage.seconds * 1e3 - learn_ms,
+                    learn_ms,
+                    ..made
+                },
+                bytes_read: bytes_read.saturating_sub(stage.bytes_read),
+                rays_per_s: rays.saturating_sub(stage.rays) as f64
                     / stage.published.map_or(stage.seconds, |at| at.elapsed().as_secs_f64()),
                 cells: sampler.cells,
                 sampler_bytes: sampler.bytes,
@@ -64,11 +64,52 @@ impl Worker {
                 input: stage.input.take(),
             },
         };
-        stage.rays = rays;
+        (stage.rays, stage.bytes_read) = (rays, bytes_read);
         stage.published = Some(Instant::now());
         stage.showing = start.elapsed();
         *self.latest.lock().unwrap_or_else(PoisonError::into_inner) = Some(picture);
         (self.tell)(Report::Picture);
+    }
+
+    /// What was rendered, as it is to be shown, and what it took to make that of it. Where a device can make it, its film is not read back. `None`
+    /// without a stage.
+    ///
+    /// # Errors
+    /// [`RenderError::Gpu`] if the device is lost.
+    fn shown(&mut self) -> Result<Option<(Shown, Stages)>, RenderError> {
+        let Some(stage) = &self.stage else { return Ok(None) };
+        let frames = stage.frames.as_ref();
+        let is_image = self.view == View::Image;
+        let clean = is_image && self.denoise && frames.spp() < CLEAN_SPP;
+        if is_image && let Some(made) = self.device.picture(frames, &stage.camera, clean)? {
+            let stages = Stages {
+                read_ms: made.read_ms,
+                history_ms: made.history_ms,
+                denoise_ms: made.filter_ms,
+                ..Stages::default()
+            };
+            return Ok(Some((Shown::radiance(made.texels), stages)));
+        }
+        let start = Instant::now();
+        let film = frames.film();
+        let mut stages = Stages {
+            read_ms: start.elapsed().as_secs_f64() * 1e3,
+            ..Stages::default()
+        };
+        let shown = if clean {
+            let cleaned = self.cleaner.clean(film, &stage.camera);
+            (stages.history_ms, stages.denoise_ms) = (cleaned.history_ms, cleaned.filter_ms);
+            Shown::radiance(
+                cleaned
+                    .pixels
+                    .par_iter()
+                    .map(|pixel| pixel.extend(1.0).to_array())
+                    .collect(),
+            )
+        } else {
+            self.view.of(frames)
+        };
+        Ok(Some((shown, stages)))
     }
 
     /// Tells how probable each light is now, if anybody wants to know.

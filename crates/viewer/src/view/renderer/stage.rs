@@ -1,9 +1,9 @@
 //! What is rendered, and how it begins.
 
-use super::Worker;
+use super::{Report, Worker};
 use glam::Vec3;
 use light_cache::SamplerKind;
-use render::{FrameLoop, Method, Settings};
+use render::{FrameLoop, Method, RenderError, Settings};
 use scene::{Camera, Scene};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -24,6 +24,8 @@ pub(super) struct Stage {
     pub(super) importance_told: Option<Instant>,
     /// Rays traced until the last picture.
     pub(super) rays: u64,
+    /// Bytes read back from the device until then, for whatever.
+    pub(super) bytes_read: u64,
     /// What the last frames took.
     pub(super) seconds: f64,
     /// What it took to make the last picture of what was rendered.
@@ -57,6 +59,7 @@ impl Worker {
             published: None,
             importance_told: None,
             rays: 0,
+            bytes_read: self.device.bytes_read(),
             seconds: 0.0,
             showing: Duration::ZERO,
             learned: [0.0; 2],
@@ -72,6 +75,14 @@ impl Worker {
                 base, scene, camera, ..
             }) => self.enter(base, scene, camera),
             None => Ok(()),
+        }
+    }
+
+    /// [`Worker::enter`] with what is there, on the processor: the device has failed.
+    pub(super) fn go_on_without_device(&mut self, why: &RenderError) {
+        self.device.give_up(&why.to_string(), &self.tell);
+        if let Err(error) = self.begin_anew() {
+            (self.tell)(Report::Trouble(format!("{error:#}")));
         }
     }
 

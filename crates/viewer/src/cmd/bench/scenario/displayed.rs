@@ -3,8 +3,8 @@
 use super::super::reference::Reference;
 use super::super::summary::median;
 use super::{Outcome, Step};
-use crate::clean::Cleaner;
 use crate::table::{align, number};
+use render::Cleaner;
 use render::{Film, Image, image};
 use scene::Camera;
 use serde::Serialize;

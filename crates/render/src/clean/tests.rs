@@ -1,5 +1,5 @@
 use super::*;
-use render::{FrameLoop, Method, Settings, renderer};
+use crate::{FrameLoop, Method, Settings, renderer};
 use scene::{Scene, generate, luminance};
 
 fn rendering<'s>(scene: &'s Scene, camera: &Camera, method: Method, frames: u32) -> Box<dyn FrameLoop<'s> + 's> {

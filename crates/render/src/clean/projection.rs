@@ -5,15 +5,15 @@ use scene::Camera;
 
 /// A camera the other way round: from the world to shares of a picture's width and height.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Projection {
-    camera_from_world: Affine3A,
+pub struct Projection {
+    pub(crate) camera_from_world: Affine3A,
     /// Half of the picture's width and height at unit distance.
-    half: Vec2,
+    pub(crate) half: Vec2,
 }
 
 impl Projection {
     /// `aspect` is width over height.
-    pub(crate) fn new(camera: &Camera, aspect: f32) -> Self {
+    pub fn new(camera: &Camera, aspect: f32) -> Self {
         let half_height = (0.5 * camera.fov_y).tan();
         Self {
             camera_from_world: camera.world_from_camera.inverse(),
@@ -23,7 +23,7 @@ impl Projection {
 
     /// Shares of width and height; `None` behind the camera.
     #[inline]
-    pub(crate) fn share(&self, point_ws: Vec3) -> Option<Vec2> {
+    pub fn share(&self, point_ws: Vec3) -> Option<Vec2> {
         let local = self.camera_from_world.transform_point3(point_ws);
         if local.z >= -1e-6 {
             return None;
@@ -33,7 +33,7 @@ impl Projection {
     }
 
     /// Height of a pixel at unit distance, in a picture of `height` rows.
-    pub(crate) fn pixel_size(&self, height: u32) -> f32 {
+    pub fn pixel_size(&self, height: u32) -> f32 {
         2.0 * self.half.y / height as f32
     }
 }

@@ -1,9 +1,9 @@
 //! A picture taken apart: what falls on the surfaces, and what is known of the surfaces.
 
 use super::projection::Projection;
+use crate::Film;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
-use render::Film;
 use scene::{Camera, luminance};
 
 /// What reflects less than this is shown as it is: lamps, and nothing at all.
@@ -59,7 +59,7 @@ impl Frame {
         let aovs = film.aovs()?;
         let (width, height) = (film.width(), film.height());
         let pixel_size = Projection::new(camera, width as f32 / height as f32).pixel_size(height);
-        let vectors = |image: render::Image| -> Vec<Vec3> { image.pixels.into_iter().map(Vec3::from).collect() };
+        let vectors = |image: crate::Image| -> Vec<Vec3> { image.pixels.into_iter().map(Vec3::from).collect() };
         let raw = vectors(film.image());
         let emitted = vectors(aovs.emitted);
         let albedo: Vec<Vec3> = vectors(aovs.albedo);

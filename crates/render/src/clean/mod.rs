@@ -10,37 +10,39 @@ mod history;
 mod projection;
 mod resolve;
 
-pub(crate) use projection::Projection;
+pub use projection::Projection;
 
+pub(crate) use filter::STEPS;
+
+use crate::Film;
 use frame::Frame;
 use glam::Vec3;
 use history::History;
-use render::Film;
 use resolve::Resolver;
 use scene::Camera;
 use std::time::Instant;
 
 /// Takes the noise away from picture after picture.
 #[derive(Debug, Default)]
-pub(crate) struct Cleaner {
+pub struct Cleaner {
     history: History,
     resolver: Resolver,
 }
 
 /// A picture without most of its noise.
 #[derive(Clone, Debug)]
-pub(crate) struct Cleaned {
+pub struct Cleaned {
     /// Radiance, row 0 at the top.
-    pub(crate) pixels: Vec<Vec3>,
+    pub pixels: Vec<Vec3>,
     /// Milliseconds of taking over what earlier pictures knew.
-    pub(crate) history_ms: f64,
+    pub history_ms: f64,
     /// Milliseconds of filtering.
-    pub(crate) filter_ms: f64,
+    pub filter_ms: f64,
 }
 
 impl Cleaner {
     /// The film's image, seen through `camera`, without most of its noise; as it is where the film has no auxiliary images.
-    pub(crate) fn clean(&mut self, film: &Film, camera: &Camera) -> Cleaned {
+    pub fn clean(&mut self, film: &Film, camera: &Camera) -> Cleaned {
         let start = Instant::now();
         let Some(mut frame) = Frame::new(film, camera) else {
             return Cleaned {
@@ -61,7 +63,7 @@ impl Cleaner {
     }
 
     /// Forgets what earlier pictures knew: another scene.
-    pub(crate) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         *self = Self::default();
     }
 }

@@ -30,6 +30,8 @@ const LEAST_TESTED: f32 = 16.0;
 /// Standard errors by which the means of a block may differ. Higher values trust history for longer; lower values take
 /// noise for change.
 const CONTRADICTION: f32 = 4.0;
+/// From so many samples on their variance is known: from two, less what rounding takes when they are looked up.
+const TWO_SAMPLES: f32 = 1.999;
 
 /// Pictures in a row.
 #[derive(Debug, Default)]
@@ -137,7 +139,7 @@ impl Known {
 
     /// Of the mean's luminance; 0 after one sample.
     fn variance(&self) -> f32 {
-        if self.samples < 2.0 {
+        if self.samples < TWO_SAMPLES {
             return 0.0;
         }
         let y = luminance_of(self.irradiance.extend(0.0));

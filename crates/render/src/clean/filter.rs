@@ -11,7 +11,7 @@ use glam::Vec4;
 use rayon::prelude::*;
 
 /// Distances between taps, pass by pass. More passes remove coarser noise; fewer keep more of the small shadows.
-const STEPS: [usize; 4] = [1, 2, 4, 8];
+pub(crate) const STEPS: [usize; 4] = [1, 2, 4, 8];
 /// How many standard errors pixels may differ and still be mixed. Higher values are smoother; lower values keep more noise.
 const TOLERANCE: f32 = 2.0;
 /// Factor on 1 - cosine between normals: about an exponent on the cosine.
