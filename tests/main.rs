@@ -12,6 +12,8 @@ mod deferred;
 mod gpu;
 /// Its auxiliary images.
 mod gpu_aovs;
+/// Its guided bounces.
+mod gpu_guides;
 /// Records that Rust and the shaders share.
 mod layout;
 /// Placed meshes and holes on the GPU back end.

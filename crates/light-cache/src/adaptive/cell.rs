@@ -332,6 +332,11 @@ impl Cell {
         self.subcells.factors_by_cube()
     }
 
+    /// Where paths go on that leave from here; `None` if none did.
+    pub(super) fn directions(&self) -> Option<&Directions> {
+        self.directions.as_deref()
+    }
+
     /// How many of its cubes anything was seen in.
     pub(super) fn cubes(&self) -> usize {
         self.subcells.len()
