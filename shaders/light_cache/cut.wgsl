@@ -23,6 +23,11 @@ const DISTANT_BRANCH: u32 = 0xffffffffu;
 const NO_FACTORS: u32 = 0xffffffffu;
 // twin: crates/light-cache/src/adaptive/directions.rs PLACES
 const PLACES: u32 = 3u;
+// twin: crates/light-cache/src/adaptive/subcells.rs LAYERS
+const LARGE_LAYER: u32 = 2u;
+const MIDDLE_LAYER: u32 = 4u;
+// twin: crates/light-cache/src/adaptive/packed.rs GUIDE
+const KEPT_GUIDE: u32 = 3u;
 
 // A cell as seen from one of its cubes; no entries: no cell.
 struct Cut {
@@ -73,20 +78,28 @@ fn kept_for(key: u32) -> u32 {
     return NO_FACTORS;
 }
 
+// Of what is kept for one of 2^`bits` cubes along an edge of a cell, the one that holds the smallest cube `cube`.
+// twin: crates/light-cache/src/adaptive/packed.rs key
+fn cube_key(cell: u32, kind: u32, cube: vec3<u32>, bits: u32) -> u32 {
+    let place = cube >> vec3<u32>(LEVELS - bits);
+    return (cell << 17u) | (kind << 15u) | place.x | (place.y << bits) | (place.z << (2u * bits));
+}
+
 // twin: crates/light-cache/src/adaptive/subcells.rs factors
 fn factors_at(cell: u32, cube: vec3<u32>) -> u32 {
-    let small = kept_for((cell << 13u) | 4096u | cube.x | (cube.y << 4u) | (cube.z << 8u));
-    if small != NO_FACTORS {
-        return small;
+    var found = kept_for(cube_key(cell, 2u, cube, LEVELS));
+    if found == NO_FACTORS {
+        found = kept_for(cube_key(cell, 1u, cube, MIDDLE_LAYER));
     }
-    let large = cube >> vec3<u32>(2u);
-    return kept_for((cell << 13u) | large.x | (large.y << 2u) | (large.z << 4u));
+    if found == NO_FACTORS {
+        found = kept_for(cube_key(cell, 0u, cube, LARGE_LAYER));
+    }
+    return found;
 }
 
 // twin: crates/light-cache/src/adaptive/directions.rs guide
 fn guide_at(cell: u32, cube: vec3<u32>, of_whole_cell: u32) -> u32 {
-    let place = cube >> vec3<u32>(LEVELS - PLACES);
-    let own = kept_for((cell << 13u) | 512u | place.x | (place.y << PLACES) | (place.z << (2u * PLACES)));
+    let own = kept_for(cube_key(cell, KEPT_GUIDE, cube, PLACES));
     return select(own, of_whole_cell, own == NO_GUIDE);
 }
 

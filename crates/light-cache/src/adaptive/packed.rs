@@ -18,8 +18,8 @@ const UNIT: usize = CELLS + 3;
 /// No such thing.
 const NONE: u32 = u32::MAX;
 
-/// Set in the keys of guides; those of factors have other numbers of cubes.
-const GUIDE_KEY: u32 = 1 << 9;
+/// What is kept for a cube: factors, by the number of their layer, or a guide.
+const GUIDE: u32 = 3;
 
 /// The factors of one cube, or its guide: key, and where they are.
 type CubeSlot = [u32; 2];
@@ -84,8 +84,8 @@ fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<Cub
     }
     let firsts = words.len() as u32;
     words.extend(cell.firsts());
-    for (cube, factors) in cell.factors_by_cube() {
-        cubes.push([number << 13 | cube, words.len() as u32]);
+    for (layer, cube, factors) in cell.factors_by_cube() {
+        cubes.push([key(number, layer, cube), words.len() as u32]);
         for lanes in [factors.drawn, factors.expected] {
             let rows = lanes.len();
             words.extend((0..count).map(|entry| lanes[entry % rows][entry / rows].to_bits()));
@@ -98,6 +98,11 @@ fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<Cub
     [count as u32, entries, attenuations, firsts, expected, guide, 0, 0]
 }
 
+/// Of what is kept for a cube of a cell. There are fewer than 2^14 cells, and 2^15 cubes in the finest layer.
+fn key(cell: u32, kind: u32, cube: u32) -> u32 {
+    cell << 17 | kind << 15 | cube
+}
+
 /// Appends the guides of a cell; returns where that of the whole cell is.
 fn pack_guides(number: u32, directions: &Directions, words: &mut Vec<u32>, cubes: &mut Vec<CubeSlot>) -> u32 {
     let mut pack = |guide: &HemisphereGuide| {
@@ -106,7 +111,7 @@ fn pack_guides(number: u32, directions: &Directions, words: &mut Vec<u32>, cubes
         at
     };
     for (cube, guide) in directions.of_places() {
-        cubes.push([number << 13 | GUIDE_KEY | cube, pack(guide)]);
+        cubes.push([key(number, GUIDE, cube), pack(guide)]);
     }
     directions.of_whole_cell().map_or(NONE, pack)
 }
