@@ -143,32 +143,38 @@ impl<'s> Case<'s> {
     /// Carries out the plan, telling the result only.
     pub fn estimate(&self) -> Estimate {
         let plan = &self.plan;
-        let size = (plan.settings.width * plan.settings.height) as usize;
-        let width = plan.settings.width as usize;
-        let mut estimate = Estimate {
-            pixels: vec![Moments::default(); size],
-            mean: Moments::default(),
-            width,
-        };
-        for repetition in 0..plan.repetitions {
+        Estimate::of((0..plan.repetitions).map(|repetition| {
             let settings = Settings {
                 seed: plan.settings.seed + repetition,
                 ..plan.settings.clone()
             };
-            let image = image_after(self.scene, &plan.before, self.camera, &settings, plan.spp);
+            image_after(self.scene, &plan.before, self.camera, &settings, plan.spp)
+        }))
+    }
+}
+
+impl Estimate {
+    /// What independent images of the same size tell.
+    pub fn of(images: impl Iterator<Item = Image>) -> Self {
+        let mut estimate = Self {
+            pixels: Vec::new(),
+            mean: Moments::default(),
+            width: 0,
+        };
+        for image in images {
+            estimate.width = image.width as usize;
+            estimate.pixels.resize(image.pixels.len(), Moments::default());
             let mut sum = 0.0;
             for (moments, &pixel) in estimate.pixels.iter_mut().zip(&image.pixels) {
                 let value = f64::from(luminance(Vec3::from_array(pixel)));
                 moments.push(value);
                 sum += value;
             }
-            estimate.mean.push(sum / size as f64);
+            estimate.mean.push(sum / image.pixels.len() as f64);
         }
         estimate
     }
-}
 
-impl Estimate {
     /// Squared standard error of each pixel: its own, or the mean of its 5 x 5 neighbours' if that is larger. A pixel that
     /// a rare light happened to miss in all repetitions shows no spread of its own.
     fn squared_errors(&self) -> Vec<f64> {

@@ -140,6 +140,7 @@ fn answers(gpu: &Gpu, packed: &Packed, asked: &[Asked]) -> Vec<Answer> {
         text: include_str!("kernels/sampler.wgsl"),
         sampler: Some(packed),
         sobol: false,
+        switches: &[],
     };
     let output = kernel
         .run(gpu, &input, ASKED, 8 * asked.len())
@@ -255,10 +256,6 @@ pub(crate) fn rendered(scene: &Scene, settings: &Settings, frames: u32, gpu: Opt
 
 /// Renders on both back ends. Another light in one of a thousand samples may be drawn, all else is rounding.
 pub(crate) fn assert_images_agree(gpu: &Arc<Gpu>, scene: &Scene, settings: &Settings, frames: u32) {
-    // The GPU does not guide bounces.
-    let mut settings = settings.clone();
-    settings.light.guided_bounces = false;
-    let settings = &settings;
     let cpu = rendered(scene, settings, frames, None);
     let device = rendered(scene, settings, frames, Some(gpu));
     let differs = |(a, b): &(&[f32; 3], &[f32; 3])| {

@@ -49,7 +49,7 @@ fn records_lie_alike_in_memory() {
     same_layout!(module, "AovPixel", AovPixel: hi, lo, depth_hi, depth_lo, hits, light);
     same_layout!(module, "PixelControl", PixelControl: share, count, mean_found, mean_control, found_sq, control_sq, mixed, scale);
     same_layout!(module, "Observation", PackedObservation: position_ws, light, normal_ws, flags, unshadowed, irradiance, pmf,
-        weight);
+        bounce_radiance);
     same_layout!(module, "SceneParams", SceneParams: fixed_root, top_root, placed, triangles, instances, meshes, materials,
         textures, emitter_lights, albedo, srgb, light_count, radius, area_lights, pad0, pad1);
     same_layout!(module, "Light", PackedLight: position_ws, kind, edge1_ws, area, edge2_ws, range, normal_ws, cos_inner,
@@ -57,7 +57,7 @@ fn records_lie_alike_in_memory() {
     let module = &self::module("thin", Scheme::Uniform, false);
     same_layout!(module, "LessonParams", LessonParams: frame, stride, pad0, pad1);
     same_layout!(module, "LessonCounters", LessonCounters: observed, kept, runs, pad);
-    same_layout!(module, "Run", Run: frame, tile, first, count);
+    same_layout!(module, "Run", Run: frame, tile, first, count, weight);
     let module = &self::module("split", Scheme::Uniform, false);
     same_layout!(module, "Seen", Seen: x_axis, half_width, y_axis, half_height, z_axis, width, translation, height);
     same_layout!(module, "CleanParams", CleanParams: now, before, spp, pixel_size, variance_scale, pad);

@@ -14,6 +14,8 @@ mod gpu;
 mod gpu_aovs;
 /// Pictures for the eyes that it makes of its film.
 mod gpu_clean;
+/// Its guided bounces.
+mod gpu_guides;
 /// Records that Rust and the shaders share.
 mod layout;
 /// Placed meshes and holes on the GPU back end.

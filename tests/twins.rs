@@ -27,6 +27,7 @@ fn integers_agree_to_the_bit() {
         text: include_str!("kernels/integers.wgsl"),
         sampler: None,
         sobol: true,
+        switches: &[],
     };
     let output = kernel
         .run(gpu, &input.concat(), COUNT, 8 * COUNT as usize)
@@ -64,6 +65,7 @@ fn shapes_and_lobes_agree() {
         text: include_str!("kernels/floats.wgsl"),
         sampler: None,
         sobol: false,
+        switches: &[],
     };
     let output = kernel
         .run(gpu, &words, COUNT, 12 * COUNT as usize)

@@ -61,6 +61,20 @@ fn frame_around(normal: vec3<f32>) -> Frame {
     );
 }
 
+// Around a normal, turning with it.
+// twin: crates/sampling/src/hemisphere.rs steady
+fn steady_frame(normal: vec3<f32>) -> Frame {
+    let a = abs(normal);
+    var across = vec3<f32>(1.0, 0.0, 0.0);
+    if a.x >= a.y && a.x >= a.z {
+        across = vec3<f32>(0.0, 1.0, 0.0);
+    } else if a.y >= a.z {
+        across = vec3<f32>(0.0, 0.0, 1.0);
+    }
+    let tangent = normalize(across - normal * dot(normal, across));
+    return Frame(tangent, cross(normal, tangent), normal);
+}
+
 // twin: crates/sampling/src/hemisphere.rs to_world
 fn to_world(frame: Frame, local: vec3<f32>) -> vec3<f32> {
     return frame.tangent * local.x + frame.bitangent * local.y + frame.normal * local.z;

@@ -118,6 +118,11 @@ fn sampler_draw(local: Local, u: u32) -> Choice {
     return choose(local, by_table, place, wide_sub(position, of_table));
 }
 
+// twin: crates/light-cache/src/adaptive/mod.rs guide
+fn sampler_guide(local: Local) -> u32 {
+    return local.cut.guide;
+}
+
 // twin: crates/light-cache/src/adaptive/mod.rs pmf
 fn sampler_pmf(local: Local, light: u32) -> f32 {
     return choose(local, true, place_of(0u, light), vec2<u32>(0u)).pmf;

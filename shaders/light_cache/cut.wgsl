@@ -6,9 +6,11 @@
 #import "lib/hash.wgsl"
 #import "lib/wide.wgsl"
 #import "light_cache/bindings.wgsl"
+#import "light_cache/grid.wgsl"
+#import "light_cache/guide.wgsl"
 #import "light_cache/light_tree.wgsl"
 
-// Words of the header: cells of 8 words each, and the hash table of the cubes' factors.
+// Words of the header: cells of 8 words each, and the hash table of what is kept for cubes within them.
 const CUT_CELLS: u32 = 21u;
 const CUT_CUBES: u32 = 22u;
 const CUT_CUBE_BITS: u32 = 23u;
@@ -19,6 +21,14 @@ const LANES: u32 = 16u;
 const LIGHT_BRANCH: u32 = 1u << 31u;
 const DISTANT_BRANCH: u32 = 0xffffffffu;
 const NO_FACTORS: u32 = 0xffffffffu;
+// twin: crates/light-cache/src/adaptive/directions.rs PLACES
+const PLACES: u32 = 3u;
+// twin: crates/light-cache/src/adaptive/subcells.rs LARGE_LAYER
+const LARGE_LAYER: u32 = 2u;
+// twin: crates/light-cache/src/adaptive/subcells.rs MIDDLE_LAYER
+const MIDDLE_LAYER: u32 = 4u;
+// twin: crates/light-cache/src/adaptive/packed.rs GUIDE
+const KEPT_GUIDE: u32 = 3u;
 
 // A cell as seen from one of its cubes; no entries: no cell.
 struct Cut {
@@ -33,6 +43,8 @@ struct Cut {
     expected: u32,
     // Of the cube, two to an entry: first all for drawing, then all for what is expected.
     factors: u32,
+    // How paths go on from there, or NO_GUIDE.
+    guide: u32,
 }
 
 struct Part {
@@ -49,8 +61,8 @@ fn is_one_light(branch: u32) -> bool {
     return (branch & LIGHT_BRANCH) != 0u && branch != DISTANT_BRANCH;
 }
 
-// What the entries of a cell are multiplied by in one cube of one layer: where it is, or NO_FACTORS.
-fn cube_factors(key: u32) -> u32 {
+// Where that is what is kept for a cube, or NO_FACTORS.
+fn kept_for(key: u32) -> u32 {
     let bits = cache_word(CUT_CUBE_BITS);
     let table = cache_word(CUT_CUBES);
     var at = (key * GOLDEN) >> (32u - bits);
@@ -67,18 +79,34 @@ fn cube_factors(key: u32) -> u32 {
     return NO_FACTORS;
 }
 
+// Of what is kept for one of 2^`bits` cubes along an edge of a cell, the one that holds the smallest cube `cube`.
+// twin: crates/light-cache/src/adaptive/packed.rs key
+fn cube_key(cell: u32, kind: u32, cube: vec3<u32>, bits: u32) -> u32 {
+    let place = cube >> vec3<u32>(LEVELS - bits);
+    return (cell << 17u) | (kind << 15u) | place.x | (place.y << bits) | (place.z << (2u * bits));
+}
+
 // twin: crates/light-cache/src/adaptive/subcells.rs factors
 fn factors_at(cell: u32, cube: vec3<u32>) -> u32 {
-    let small = cube_factors((cell << 13u) | 4096u | cube.x | (cube.y << 4u) | (cube.z << 8u));
-    if small != NO_FACTORS {
-        return small;
+    var found = kept_for(cube_key(cell, 2u, cube, LEVELS));
+    if found == NO_FACTORS {
+        found = kept_for(cube_key(cell, 1u, cube, MIDDLE_LAYER));
     }
-    let large = cube >> vec3<u32>(2u);
-    return cube_factors((cell << 13u) | large.x | (large.y << 2u) | (large.z << 4u));
+    if found == NO_FACTORS {
+        found = kept_for(cube_key(cell, 0u, cube, LARGE_LAYER));
+    }
+    return found;
+}
+
+// twin: crates/light-cache/src/adaptive/directions.rs guide
+fn guide_at(cell: u32, cube: vec3<u32>, of_whole_cell: u32) -> u32 {
+    let own = kept_for(cube_key(cell, KEPT_GUIDE, cube, PLACES));
+    return select(own, of_whole_cell, own == NO_GUIDE);
 }
 
 fn cut_at(cell: u32, cube: vec3<u32>) -> Cut {
     var cut: Cut;
+    cut.guide = NO_GUIDE;
     if cell == 0xffffffffu {
         return cut;
     }
@@ -89,8 +117,12 @@ fn cut_at(cell: u32, cube: vec3<u32>) -> Cut {
     cut.entries = first.y >> 2u;
     cut.attenuations = first.z;
     cut.firsts = first.w;
-    cut.expected = cache[at + 1u].x;
+    let second = cache[at + 1u];
+    cut.expected = second.x;
     cut.factors = factors_at(cell, cube);
+    if GUIDED {
+        cut.guide = guide_at(cell, cube, second.y);
+    }
     return cut;
 }
 

@@ -1,5 +1,6 @@
 // One distribution over all lights for first hits, one for later ones: `power` and `table`. Header: where both are.
 #import "light_cache/distribution.wgsl"
+#import "light_cache/guide.wgsl"
 
 struct Local {
     distribution: u32,
@@ -16,4 +17,9 @@ fn sampler_draw(local: Local, u: u32) -> Choice {
 
 fn sampler_pmf(local: Local, light: u32) -> f32 {
     return distribution_pmf(local.distribution, light);
+}
+
+// Nothing is known.
+fn sampler_guide(local: Local) -> u32 {
+    return NO_GUIDE;
 }

@@ -19,7 +19,7 @@ const SECONDARY_SCALE: f32 = 4.0;
 // twin: crates/light-cache/src/adaptive/grid.rs MAX_LEVEL
 const MAX_LEVEL: u32 = 31u;
 // twin: crates/light-cache/src/adaptive/subcells.rs LEVELS
-const LEVELS: u32 = 4u;
+const LEVELS: u32 = 5u;
 
 struct Spot {
     key: vec2<u32>,

@@ -1,4 +1,5 @@
 // The plain light tree as a sampler. Header: the tree.
+#import "light_cache/guide.wgsl"
 #import "light_cache/light_tree.wgsl"
 
 struct Local {
@@ -26,4 +27,9 @@ fn sampler_pmf(local: Local, light: u32) -> f32 {
         return 0.0;
     }
     return probability(descent_width(local.descent, place_of(0u, light), UNIT_WIDTH));
+}
+
+// Nothing is known.
+fn sampler_guide(local: Local) -> u32 {
+    return NO_GUIDE;
 }

@@ -1,5 +1,6 @@
 // Every light alike. Header: count, units, longer, boundary, both probabilities.
 #import "light_cache/bindings.wgsl"
+#import "light_cache/guide.wgsl"
 
 struct Local {
     point: ShadingPoint,
@@ -26,4 +27,9 @@ fn sampler_draw(local: Local, u: u32) -> Choice {
 // twin: crates/light-cache/src/uniform.rs pmf
 fn sampler_pmf(local: Local, light: u32) -> f32 {
     return cache_f32(select(5u, 4u, light < cache_word(2u)));
+}
+
+// Nothing is known.
+fn sampler_guide(local: Local) -> u32 {
+    return NO_GUIDE;
 }

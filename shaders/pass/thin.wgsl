@@ -75,7 +75,7 @@ fn thin(
                 first = atomicAdd(&counters.kept, sums.y);
                 let run = atomicAdd(&counters.runs, 1u);
                 if run < arrayLength(&runs) {
-                    runs[run] = Run(lesson.frame, number, first, sums.y);
+                    runs[run] = Run(lesson.frame, number, first, sums.y, weight);
                 }
             }
             workgroupBarrier();
@@ -104,7 +104,9 @@ fn thin(
                 if round == 1u {
                     keeps += 1u;
                 } else if next < arrayLength(&kept) {
-                    seen.weight = stands_for;
+                    if stands_for > 1u {
+                        seen.flags |= OBSERVED_FOR_MANY;
+                    }
                     kept[next] = seen;
                     next += 1u;
                 }

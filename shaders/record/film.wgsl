@@ -41,11 +41,16 @@ struct Observation {
     unshadowed: f32,
     irradiance: f32,
     pmf: f32,
-    // How many such observations it stands for.
-    weight: u32,
+    // Luminance of what arrived from where the path went on, if it is OBSERVED_BOUNCE.
+    bounce_radiance: f32,
 }
 
 const NO_LIGHT: u32 = 0xffffffffu;
 
 const OBSERVED_PRIMARY: u32 = 1u;
 const OBSERVED_VISIBLE: u32 = 2u;
+// It stands for as many as the run that it is kept in says.
+const OBSERVED_FOR_MANY: u32 = 4u;
+// The path went on from there: into which part of the hemisphere is told by the bits from OBSERVED_PART on.
+const OBSERVED_BOUNCE: u32 = 8u;
+const OBSERVED_PART: u32 = 8u;

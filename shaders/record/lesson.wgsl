@@ -24,4 +24,6 @@ struct Run {
     tile: u32,
     first: u32,
     count: u32,
+    // How many observations each one stands for that is OBSERVED_FOR_MANY.
+    weight: u32,
 }

@@ -2,6 +2,7 @@
 #import "lib/constants.wgsl"
 #import "lib/ggx.wgsl"
 #import "lib/hemisphere.wgsl"
+#import "light_cache/guide.wgsl"
 #import "scene/bindings.wgsl"
 
 struct Bsdf {
@@ -17,6 +18,8 @@ struct BsdfValue {
     value: vec3<f32>,
     // Density of sampling, solid angle.
     pdf: f32,
+    // What it would be without a guide.
+    pdf_unguided: f32,
 }
 
 struct BsdfSample {
@@ -24,6 +27,7 @@ struct BsdfSample {
     // 0: absorbed.
     pdf: f32,
     value: vec3<f32>,
+    pdf_unguided: f32,
 }
 
 // Rows and columns of the table of specular albedos.
@@ -97,26 +101,29 @@ fn specular_probability(bsdf: Bsdf, specular: f32) -> f32 {
     return clamp(specular / (specular + diffuse), 0.1, 0.9);
 }
 
-// twin: crates/scene/src/bsdf.rs eval_pdf
-fn eval_bsdf(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>) -> BsdfValue {
+// With the diffuse lobe drawn as `guide` says, unless that is NO_GUIDE.
+// twin: crates/scene/src/bsdf.rs eval_pdf_guided
+fn eval_bsdf(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>, guide: u32) -> BsdfValue {
     let cos_i = dot(bsdf.normal_ws, wi_ws);
     if !(cos_i > 0.0) {
-        return BsdfValue(vec3<f32>(0.0), 0.0);
+        return BsdfValue(vec3<f32>(0.0), 0.0, 0.0);
     }
     let lambert = cos_i * FRAC_1_PI;
+    let factor = guide_density(guide, bsdf.normal_ws, wi_ws);
     if is_lambert(bsdf) {
-        return BsdfValue(bsdf.diffuse * lambert, lambert);
+        return BsdfValue(bsdf.diffuse * lambert, lambert * factor, lambert);
     }
-    return eval_layered(bsdf, wo_ws, wi_ws, cos_i);
+    return eval_layered(bsdf, wo_ws, wi_ws, cos_i, factor);
 }
 
+// The diffuse lobe's density is multiplied by `factor`.
 // twin: crates/scene/src/bsdf.rs layered
-fn eval_layered(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>, cos_i: f32) -> BsdfValue {
+fn eval_layered(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>, cos_i: f32, factor: f32) -> BsdfValue {
     let cos_o = dot(bsdf.normal_ws, wo_ws);
     let sum = wo_ws + wi_ws;
     let sum_sq = dot(sum, sum);
     if cos_o <= 0.0 || sum_sq <= 0.0 {
-        return BsdfValue(vec3<f32>(0.0), 0.0);
+        return BsdfValue(vec3<f32>(0.0), 0.0, 0.0);
     }
     let half = sum / sqrt(sum_sq);
     let alpha_sq = bsdf.alpha * bsdf.alpha;
@@ -133,33 +140,48 @@ fn eval_layered(bsdf: Bsdf, wo_ws: vec3<f32>, wi_ws: vec3<f32>, cos_i: f32) -> B
     let albedo = specular_albedo(bsdf);
     let albedo_o = albedo_at(albedo, cos_o);
     let probability = specular_probability(bsdf, albedo_o);
-    let pdf = probability * pdf_specular + (1.0 - probability) * lambert;
+    let from_specular = probability * pdf_specular;
+    let from_diffuse = (1.0 - probability) * lambert;
     let mean = 1.0 - albedo_mean(albedo);
     var coupling = 0.0;
     if mean > 1e-6 {
         coupling = min(max((1.0 - albedo_at(albedo, cos_i)) * (1.0 - albedo_o), 0.0) / mean, MOST_COUPLING);
     }
-    return BsdfValue(specular + bsdf.diffuse * (coupling * lambert), pdf);
+    let value = specular + bsdf.diffuse * (coupling * lambert);
+    return BsdfValue(value, from_specular + from_diffuse * factor, from_specular + from_diffuse);
 }
 
-// twin: crates/scene/src/bsdf.rs sample
-fn sample_bsdf(bsdf: Bsdf, wo_ws: vec3<f32>, u_lobe: f32, u: vec2<f32>) -> BsdfSample {
+// twin: crates/scene/src/bsdf.rs sample_guided
+// twin: crates/scene/src/bsdf.rs sample_layered
+fn sample_bsdf(bsdf: Bsdf, wo_ws: vec3<f32>, u_lobe: f32, u: vec2<f32>, guide: u32) -> BsdfSample {
     let around = frame_around(bsdf.normal_ws);
-    if is_lambert(bsdf) {
-        let local = cosine_hemisphere(u);
-        let lambert = local.z * FRAC_1_PI;
-        return BsdfSample(to_world(around, local), lambert, bsdf.diffuse * lambert);
-    }
-    let cos_o = dot(bsdf.normal_ws, wo_ws);
     var wi_ws: vec3<f32>;
-    if u_lobe < specular_probability(bsdf, albedo_at(specular_albedo(bsdf), cos_o)) {
+    var lambert = 0.0;
+    var factor = 1.0;
+    var is_specular = false;
+    if !is_lambert(bsdf) {
+        let cos_o = dot(bsdf.normal_ws, wo_ws);
+        is_specular = u_lobe < specular_probability(bsdf, albedo_at(specular_albedo(bsdf), cos_o));
+    }
+    if is_specular {
         let wo = to_local(around, wo_ws);
         let half = sample_vndf(wo, bsdf.alpha, u);
         wi_ws = normalize(to_world(around, half * (2.0 * dot(wo, half)) - wo));
+    } else if GUIDED && guide != NO_GUIDE {
+        let guided = sample_guide(guide, bsdf.normal_ws, u);
+        wi_ws = guided.direction_ws;
+        factor = guided.factor;
+        // Rounding can put it on the horizon.
+        lambert = max(dot(bsdf.normal_ws, wi_ws), 0.0) * FRAC_1_PI;
     } else {
-        wi_ws = to_world(around, cosine_hemisphere(u));
+        let local = cosine_hemisphere(u);
+        wi_ws = to_world(around, local);
+        lambert = local.z * FRAC_1_PI;
     }
-    let value = eval_bsdf(bsdf, wo_ws, wi_ws);
+    if is_lambert(bsdf) {
+        return BsdfSample(wi_ws, lambert * factor, bsdf.diffuse * lambert, lambert);
+    }
+    let value = eval_bsdf(bsdf, wo_ws, wi_ws, guide);
     let usable = value.pdf > 0.0 && is_finite(value.pdf) && is_finite(value.value.x + value.value.y + value.value.z);
-    return BsdfSample(wi_ws, select(0.0, value.pdf, usable), value.value);
+    return BsdfSample(wi_ws, select(0.0, value.pdf, usable), value.value, value.pdf_unguided);
 }

@@ -64,6 +64,11 @@ impl HemisphereGuide {
         interval(&self.rings, ring).1 * interval(&self.sectors[ring], part % SECTORS).1 * PARTS as f32
     }
 
+    /// All it consists of: where the rings begin, then the sectors of each ring.
+    pub fn starts(&self) -> impl Iterator<Item = f32> {
+        self.rings.iter().chain(self.sectors.as_flattened()).copied()
+    }
+
     /// Whether it can be the outcome of [`HemisphereGuide::new`]: what was read from a file may be anything.
     pub fn is_sound(&self) -> bool {
         fn ascend(starts: &[f32]) -> bool {

@@ -140,8 +140,8 @@ pub(super) struct Lights<'l> {
 /// Whether there may be more of what is kept within cells.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MayGrow {
-    /// [`SubCells`]
-    pub(super) cubes: bool,
+    /// Layers of [`SubCells`], largest cubes first.
+    pub(super) cubes: usize,
     /// [`Directions`]
     pub(super) places: bool,
 }
@@ -328,8 +328,13 @@ impl Cell {
     }
 
     /// See [`SubCells::factors_by_cube`].
-    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, Factors<'_>)> {
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, u32, Factors<'_>)> {
         self.subcells.factors_by_cube()
+    }
+
+    /// Where paths go on that leave from here; `None` if none did.
+    pub(super) fn directions(&self) -> Option<&Directions> {
+        self.directions.as_deref()
     }
 
     /// How many of its cubes anything was seen in.

@@ -2,7 +2,7 @@
 
 use super::cell::{Cell, Entry, Lights, MayGrow, Nearby, Origin};
 use super::grid::{Grid, NO_CELL, Spot, dominant_axis};
-use super::subcells::Cube;
+use super::subcells::{self, Cube};
 use crate::tree::{Receiver, Tree};
 use crate::{CellRecord, Observation, ShadingPoint};
 use glam::Vec3;
@@ -10,8 +10,10 @@ use rayon::prelude::*;
 
 /// Most cells; points beyond are served by the tree.
 const MAX_CELLS: usize = 1 << 14;
-/// No cubes are added when there are more than this in all: they know no more then than their cells.
+/// No cubes are added when there are more than this in all, and no smallest ones when there are more than half as many: places without know no more
+/// than what is around them.
 const MAX_CUBES: usize = 1 << 17;
+const SMALLEST_CUBES: usize = MAX_CUBES / 2;
 
 /// The same for places that paths go on from.
 const MAX_PLACES: usize = 1 << 15;
@@ -181,7 +183,11 @@ impl Cells {
         }
         let unit = self.unit;
         let may_grow = MayGrow {
-            cubes: self.cells.iter().map(Cell::cubes).sum::<usize>() < MAX_CUBES,
+            cubes: match self.cells.iter().map(Cell::cubes).sum::<usize>() {
+                0..SMALLEST_CUBES => subcells::LAYERS.len(),
+                SMALLEST_CUBES..MAX_CUBES => subcells::LAYERS.len() - 1,
+                _ => 0,
+            },
             places: self.cells.iter().map(Cell::places).sum::<usize>() < MAX_PLACES,
         };
         let by_cell = &by_cell;

@@ -173,6 +173,17 @@ impl Directions {
             .or(self.whole.guide.as_ref())
     }
 
+    /// For paths that leave from where no place has a guide of its own.
+    pub(super) fn of_whole_cell(&self) -> Option<&HemisphereGuide> {
+        self.whole.guide.as_ref()
+    }
+
+    /// The guides of places, each with the number of its cube.
+    pub(super) fn of_places(&self) -> impl Iterator<Item = (u32, &HemisphereGuide)> {
+        let numbered = (0..).zip(&self.numbers);
+        numbered.filter_map(|(cube, &number)| Some((cube, self.places.get(usize::from(number))?.guide.as_ref()?)))
+    }
+
     /// Whether it can be what was learned in a cell.
     pub(super) fn is_sound(&self) -> bool {
         let numbered = |&number: &u16| number == NONE || usize::from(number) < self.places.len();

@@ -2,8 +2,10 @@
 
 use super::AdaptiveSampler;
 use super::cell::Cell;
+use super::directions::Directions;
 use crate::packed::{self, Packed, Scheme, align};
 use crate::{LightSampler, TableSampler};
+use sampling::HemisphereGuide;
 
 /// Words of the header; the tree's are the first.
 const HEADER: usize = 25;
@@ -16,7 +18,10 @@ const UNIT: usize = CELLS + 3;
 /// No such thing.
 const NONE: u32 = u32::MAX;
 
-/// The factors of one cube: key, and where they are.
+/// What is kept for a cube: factors, by the number of their layer, or a guide.
+const GUIDE: u32 = 3;
+
+/// The factors of one cube, or its guide: key, and where they are.
 type CubeSlot = [u32; 2];
 
 impl AdaptiveSampler {
@@ -47,7 +52,7 @@ impl AdaptiveSampler {
     }
 }
 
-/// Appends the cut of a cell and its factors; returns its record.
+/// Appends the cut of a cell, its factors and its guides; returns its record.
 fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<CubeSlot>) -> [u32; 8] {
     let count = cell.entries.len();
     let entries = align(words);
@@ -79,14 +84,36 @@ fn pack_cell(number: u32, cell: &Cell, words: &mut Vec<u32>, cubes: &mut Vec<Cub
     }
     let firsts = words.len() as u32;
     words.extend(cell.firsts());
-    for (cube, factors) in cell.factors_by_cube() {
-        cubes.push([number << 13 | cube, words.len() as u32]);
+    for (layer, cube, factors) in cell.factors_by_cube() {
+        cubes.push([key(number, layer, cube), words.len() as u32]);
         for lanes in [factors.drawn, factors.expected] {
             let rows = lanes.len();
             words.extend((0..count).map(|entry| lanes[entry % rows][entry / rows].to_bits()));
         }
     }
-    [count as u32, entries, attenuations, firsts, expected, 0, 0, 0]
+    let guide = match cell.directions() {
+        Some(directions) => pack_guides(number, directions, words, cubes),
+        None => NONE,
+    };
+    [count as u32, entries, attenuations, firsts, expected, guide, 0, 0]
+}
+
+/// Of what is kept for a cube of a cell. There are fewer than 2^14 cells, and 2^15 cubes in the finest layer.
+fn key(cell: u32, kind: u32, cube: u32) -> u32 {
+    cell << 17 | kind << 15 | cube
+}
+
+/// Appends the guides of a cell; returns where that of the whole cell is.
+fn pack_guides(number: u32, directions: &Directions, words: &mut Vec<u32>, cubes: &mut Vec<CubeSlot>) -> u32 {
+    let mut pack = |guide: &HemisphereGuide| {
+        let at = align(words);
+        words.extend(guide.starts().map(f32::to_bits));
+        at
+    };
+    for (cube, guide) in directions.of_places() {
+        cubes.push([key(number, GUIDE, cube), pack(guide)]);
+    }
+    directions.of_whole_cell().map_or(NONE, pack)
 }
 
 /// Appends a hash table, at most half full; returns where it is and the binary logarithm of its size.

@@ -2,7 +2,8 @@
 //! count visibility of their own.
 //!
 //! Ratios and the cut need many observations, so they are learned by the cell as a whole; shadows need resolution, and for
-//! them a few observations of each entry in a cube are enough, with the visible share in the larger cube around it as the prior.
+//! them a few observations of each entry in a cube are enough, with the visible share in the larger cube around it as the prior,
+//! and with what the cubes beside it have seen for as long as it has seen little itself.
 
 use super::branch::Branch;
 use super::weights::{Factors, LANES, Lanes};
@@ -10,14 +11,21 @@ use crate::Observation;
 use crate::state::is_amount;
 use crate::tree::Tree;
 
-/// Cubes of each layer along an edge of the cell: 2 to this power. Higher values follow finer shadows; lower values learn faster.
-const LAYERS: [u32; 2] = [2, LEVELS];
-/// The same for the smallest.
-pub(super) const LEVELS: u32 = 4;
+/// Cubes of the layers along an edge of the cell: 2 to this power, largest cubes first. Higher values follow finer shadows; lower values
+/// learn faster.
+pub(super) const LAYERS: [u32; 3] = [LARGE_LAYER, MIDDLE_LAYER, LEVELS];
+const LARGE_LAYER: u32 = 2;
+const MIDDLE_LAYER: u32 = 4;
+/// Of the smallest cubes.
+pub(super) const LEVELS: u32 = 5;
 /// How many observations the share around a cube is worth in it.
 const PRIOR_COUNT: f32 = 4.0;
 /// Part of the prior that does not fade, as in the whole cell: what was not visible so far may still be, to few points.
 const LASTING_PRIOR: f32 = 0.03;
+/// Part of what the six cubes beside a cube have seen that counts in it too. Higher values learn faster; lower values keep the borders of shadows.
+const BESIDE_SHARE: f32 = 0.5;
+/// How many observations of an entry that is worth at most: the same trade.
+const BESIDE_COUNT: f32 = 8.0;
 /// With a control variate, by how much the squared weight of an entry that is certain to be visible is reduced. Where visibility V has mean
 /// q, a draw without one brings V with a mean square of q, and with one V - q with a mean square of q (1 - q): higher values trust
 /// that; lower values allow for all else that an entry's contribution varies by.
@@ -28,7 +36,7 @@ const REBUILD_GROWTH: f32 = 1.15;
 const NONE: u16 = u16::MAX;
 
 /// Which of the smallest cubes of its cell a point is in.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Cube([u16; 3]);
 
 impl Cube {
@@ -41,8 +49,33 @@ impl Cube {
     /// Which cube of a layer that is in, if the layer has 2^`bits` along an edge.
     #[inline]
     pub(super) fn within(self, bits: u32) -> usize {
-        let [x, y, z] = self.0.map(|c| usize::from(c >> (LEVELS - bits)));
-        x | y << bits | z << (2 * bits)
+        self.part(bits, bits)
+    }
+
+    /// The same, but counted in a cube around it that has 2^`step` of these along an edge.
+    #[inline]
+    fn part(self, bits: u32, step: u32) -> usize {
+        let [x, y, z] = self.0.map(|c| usize::from(c >> (LEVELS - bits)) & ((1 << step) - 1));
+        x | y << step | z << (2 * step)
+    }
+
+    /// The cubes beside it in such a layer, as far as they are in the cell.
+    fn beside(self, bits: u32) -> impl Iterator<Item = Self> {
+        let size = 1 << (LEVELS - bits);
+        let moved = move |axis: usize, forward: bool| {
+            let mut position = self.0;
+            position[axis] = if forward {
+                position[axis] + size
+            } else {
+                position[axis].checked_sub(size)?
+            };
+            (position[axis] < 1 << LEVELS).then_some(Self(position))
+        };
+        (0..3).flat_map(move |axis| {
+            [false, true]
+                .into_iter()
+                .filter_map(move |forward| moved(axis, forward))
+        })
     }
 }
 
@@ -77,6 +110,8 @@ impl Count {
 struct SubCell {
     /// Number of the one around it in the layer before.
     around: u16,
+    /// One of the smallest cubes in it.
+    place: Cube,
     /// Of every entry of the cell's cut.
     counts: Vec<Count>,
     /// [`Factors::drawn`]; empty before anything is known.
@@ -88,6 +123,19 @@ struct SubCell {
 }
 
 impl SubCell {
+    /// Nothing seen of so many `entries`.
+    fn new(around: u16, place: Cube, entries: usize) -> Self {
+        Self {
+            around,
+            place,
+            counts: vec![Count::default(); entries],
+            drawn: Vec::new(),
+            expected: Vec::new(),
+            seen: 0.0,
+            built_at: 0.0,
+        }
+    }
+
     /// Takes note of draws of an entry.
     fn observe(&mut self, entry: usize, draws: Count) {
         let count = &mut self.counts[entry];
@@ -96,16 +144,16 @@ impl SubCell {
         self.seen += draws.drawn;
     }
 
-    /// Makes the factors. `whole`: what the whole cell has seen of each entry; `around`: how much more or less the cube around this one
-    /// expects of each, empty for 1; `certainty`: see [`CERTAINTY`], 0 without a control variate.
-    fn build(&mut self, whole: &[Count], around: &[Lanes], certainty: f32) {
+    /// Makes the factors. `counts`: what was seen of each entry, here and beside; `whole`: what the whole cell has seen of it; `around`: how
+    /// much more or less the cube around this one expects of each, empty for 1; `certainty`: see [`CERTAINTY`], 0 without a control variate.
+    fn build(&mut self, counts: &[Count], whole: &[Count], around: &[Lanes], certainty: f32) {
         self.built_at = self.seen;
         let rows = whole.len().div_ceil(LANES);
         for factors in [&mut self.drawn, &mut self.expected] {
             factors.clear();
             factors.resize(rows, [1.0; LANES]);
         }
-        for (entry, (own, whole)) in self.counts.iter().zip(whole).enumerate() {
+        for (entry, (own, whole)) in counts.iter().zip(whole).enumerate() {
             // As if it had been visible once in half as many draws more: never 0.
             let share = (whole.visible + 0.5) / (whole.drawn + 1.0);
             let (row, lane) = (entry % rows, entry / rows);
@@ -124,12 +172,12 @@ impl SubCell {
         }
     }
 
-    /// Whether it can be one of a cut into so many `entries`, with so many cubes in the layer `before`.
-    fn is_sound(&self, entries: usize, before: usize) -> bool {
+    /// Whether it can be one of a cut into so many `entries`, with so many cubes in the layer `before`; `None`: there is no such layer.
+    fn is_sound(&self, entries: usize, before: Option<usize>) -> bool {
         let rows = entries.div_ceil(LANES);
         let factors = [&self.drawn, &self.expected];
-        (self.around == NONE) == (before == 0)
-            && (before == 0 || usize::from(self.around) < before)
+        before.map_or(self.around == NONE, |before| usize::from(self.around) < before)
+            && self.place.0.iter().all(|c| *c < 1 << LEVELS)
             && self.counts.len() == entries
             && self
                 .counts
@@ -153,9 +201,28 @@ impl SubCell {
 /// All cubes of one size in which anything was seen.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 struct Layer {
-    /// Number of each cube's [`SubCell`].
+    /// Number of the [`SubCell`] of each part of the cubes of the layer before, cube by cube.
     numbers: Vec<u16>,
     subcells: Vec<SubCell>,
+}
+
+impl Layer {
+    /// The cube that holds `place` in the cube number `around` of the layer before; `None` if nothing was seen there. `bits`, `step`: see [`LAYERS`] and [`steps`].
+    #[inline]
+    fn find(&self, around: usize, place: Cube, bits: u32, step: u32) -> Option<usize> {
+        let number = self.numbers[around << (3 * step) | place.part(bits, step)];
+        (number != NONE).then_some(usize::from(number))
+    }
+}
+
+/// Of each layer its power of two, and how much higher that is than that of the layer before.
+#[inline]
+fn steps() -> impl Iterator<Item = (u32, u32)> {
+    let before = [0].into_iter().chain(LAYERS);
+    LAYERS
+        .into_iter()
+        .zip(before)
+        .map(|(bits, before)| (bits, bits - before))
 }
 
 /// All cubes of a cell in which anything was seen.
@@ -170,7 +237,12 @@ impl SubCells {
     /// None yet; `controlled`: for a control variate.
     pub(super) fn new(controlled: bool) -> Self {
         let layer = |bits| Layer {
-            numbers: vec![NONE; 1_usize << (3 * bits)],
+            // Of the largest cubes the cell itself is what is around them.
+            numbers: if bits == LAYERS[0] {
+                vec![NONE; 1_usize << (3 * bits)]
+            } else {
+                Vec::new()
+            },
             subcells: Vec::new(),
         };
         Self {
@@ -179,51 +251,54 @@ impl SubCells {
         }
     }
 
-    /// How many of the smallest cubes there are.
+    /// How many cubes there are, of all sizes.
     pub(super) fn len(&self) -> usize {
-        self.layers[LAYERS.len() - 1].subcells.len()
+        self.layers.iter().map(|layer| layer.subcells.len()).sum()
     }
 
     /// By what a cube differs from the cell.
     #[inline]
     pub(super) fn factors(&self, cube: Cube) -> Factors<'_> {
-        for (layer, bits) in self.layers.iter().zip(LAYERS).rev() {
-            if let Some(subcell) = layer.subcells.get(usize::from(layer.numbers[cube.within(bits)])) {
-                return subcell.factors();
-            }
+        let mut factors = Factors::default();
+        let mut around = 0;
+        for (layer, (bits, step)) in self.layers.iter().zip(steps()) {
+            let Some(number) = layer.find(around, cube, bits, step) else {
+                break;
+            };
+            factors = layer.subcells[number].factors();
+            around = number;
         }
-        Factors::default()
+        factors
     }
 
-    /// All factors, each with the number of its cube in its layer; bit 12 is set for the smallest cubes.
-    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, Factors<'_>)> {
-        self.layers.iter().zip([0, 1 << 12]).flat_map(|(layer, bit)| {
-            let numbered = (0..).zip(&layer.numbers);
-            numbered.filter_map(move |(cube, &number)| {
-                let subcell = layer.subcells.get(usize::from(number))?;
-                (!subcell.drawn.is_empty()).then(|| (bit | cube, subcell.factors()))
+    /// All factors, each with the number of its layer and that of its cube in the layer.
+    pub(super) fn factors_by_cube(&self) -> impl Iterator<Item = (u32, u32, Factors<'_>)> {
+        (0..)
+            .zip(self.layers.iter().zip(LAYERS))
+            .flat_map(|(number, (layer, bits))| {
+                let built = layer.subcells.iter().filter(|subcell| !subcell.drawn.is_empty());
+                built.map(move |subcell| (number, subcell.place.within(bits) as u32, subcell.factors()))
             })
-        })
     }
 
-    /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing, if they `may_grow` in number.
-    pub(super) fn observe(&mut self, cube: Cube, entry: usize, draws: Count, entries: usize, may_grow: bool) {
+    /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing in as many layers as `may_grow`.
+    pub(super) fn observe(&mut self, cube: Cube, entry: usize, draws: Count, entries: usize, may_grow: usize) {
         let mut around = NONE;
-        for (layer, bits) in self.layers.iter_mut().zip(LAYERS) {
-            let number = &mut layer.numbers[cube.within(bits)];
+        for (index, (bits, step)) in steps().enumerate() {
+            let (layer, finer) = self.layers[index..]
+                .split_first_mut()
+                .expect("there are as many layers as steps");
+            let whole = if index == 0 { 0 } else { usize::from(around) };
+            let number = &mut layer.numbers[whole << (3 * step) | cube.part(bits, step)];
             if *number == NONE {
-                if !may_grow {
+                if index >= may_grow {
                     return;
                 }
                 *number = layer.subcells.len() as u16;
-                layer.subcells.push(SubCell {
-                    around,
-                    counts: vec![Count::default(); entries],
-                    drawn: Vec::new(),
-                    expected: Vec::new(),
-                    seen: 0.0,
-                    built_at: 0.0,
-                });
+                layer.subcells.push(SubCell::new(around, cube, entries));
+                if let (Some(finer), Some((_, step))) = (finer.first_mut(), steps().nth(index + 1)) {
+                    finer.numbers.resize(layer.subcells.len() << (3 * step), NONE);
+                }
             }
             around = *number;
             layer.subcells[usize::from(around)].observe(entry, draws);
@@ -232,16 +307,53 @@ impl SubCells {
 
     /// Makes the factors of the cubes that have seen enough that is new, or of `all`. `whole`: what the whole cell has seen of each entry.
     pub(super) fn refresh(&mut self, whole: &[Count], all: bool) {
-        let mut before: &[SubCell] = &[];
-        for layer in &mut self.layers {
-            for subcell in &mut layer.subcells {
+        for index in 0..LAYERS.len() {
+            for number in 0..self.layers[index].subcells.len() {
+                let subcell = &self.layers[index].subcells[number];
                 if all || subcell.seen >= REBUILD_GROWTH * subcell.built_at {
-                    let around = before.get(usize::from(subcell.around));
-                    subcell.build(whole, around.map_or(&[], |subcell| &subcell.expected), self.certainty);
+                    let counts = self.counts(index, subcell);
+                    let (before, rest) = self.layers.split_at_mut(index);
+                    let subcell = &mut rest[0].subcells[number];
+                    let around = before.last().map(|layer| &layer.subcells[usize::from(subcell.around)]);
+                    subcell.build(
+                        &counts,
+                        whole,
+                        around.map_or(&[], |subcell| &subcell.expected),
+                        self.certainty,
+                    );
                 }
             }
-            before = &layer.subcells;
         }
+    }
+
+    /// What was seen of each entry in a cube of layer `index`, with a part of what was seen beside it.
+    fn counts(&self, index: usize, subcell: &SubCell) -> Vec<Count> {
+        let mut beside = vec![Count::default(); subcell.counts.len()];
+        for place in subcell.place.beside(LAYERS[index]) {
+            if let Some(other) = self.find(index, place) {
+                for (sum, seen) in beside.iter_mut().zip(&other.counts) {
+                    sum.drawn += seen.drawn;
+                    sum.visible += seen.visible;
+                }
+            }
+        }
+        let both = subcell.counts.iter().zip(&beside).map(|(own, beside)| {
+            let share = BESIDE_SHARE.min(BESIDE_COUNT / beside.drawn.max(1.0));
+            Count {
+                drawn: own.drawn + share * beside.drawn,
+                visible: own.visible + share * beside.visible,
+            }
+        });
+        both.collect()
+    }
+
+    /// The cube of layer `index` that holds `place`.
+    fn find(&self, index: usize, place: Cube) -> Option<&SubCell> {
+        let mut around = 0;
+        for (layer, (bits, step)) in self.layers[..=index].iter().zip(steps()) {
+            around = layer.find(around, place, bits, step)?;
+        }
+        self.layers[index].subcells.get(around)
     }
 
     /// The cell has another cut: what was seen of the old entries is dealt out to the new ones, by the number of lights.
@@ -260,17 +372,17 @@ impl SubCells {
 
     /// Whether these can be the cubes of a cell with a cut into so many `entries`.
     pub(super) fn is_sound(&self, entries: usize, controlled: bool) -> bool {
-        let mut before = 0;
-        let mut sound = |(layer, bits): (&Layer, u32)| {
+        let mut before = None;
+        let mut sound = |(layer, (_, step)): (&Layer, (u32, u32))| {
             let count = layer.subcells.len();
             let numbered = |&number: &u16| number == NONE || usize::from(number) < count;
-            let sound = layer.numbers.len() == 1 << (3 * bits)
+            let sound = layer.numbers.len() == before.unwrap_or(1) << (3 * step)
                 && layer.numbers.iter().all(numbered)
                 && layer.subcells.iter().all(|subcell| subcell.is_sound(entries, before));
-            before = count;
+            before = Some(count);
             sound
         };
-        self.certainty == Self::new(controlled).certainty && self.layers.iter().zip(LAYERS).all(&mut sound)
+        self.certainty == Self::new(controlled).certainty && self.layers.iter().zip(steps()).all(&mut sound)
     }
 
     /// Bytes held.
@@ -324,28 +436,78 @@ mod tests {
         ]
     }
 
+    fn see(subcells: &mut SubCells, cube: Cube, entry: usize, times: u32, visible: f32) {
+        for _ in 0..times {
+            let draws = Count {
+                drawn: 2.0,
+                visible: 2.0 * visible,
+            };
+            subcells.observe(cube, entry, draws, 20, LAYERS.len());
+        }
+    }
+
+    /// Of one of 20 entries, which lie in two rows.
+    fn factor(subcells: &SubCells, cube: Cube, entry: usize) -> f32 {
+        subcells.factors(cube).drawn[entry % 2][entry / 2]
+    }
+
     #[test]
     fn cubes_are_told_apart_and_believe_what_is_around_them() {
         let mut subcells = SubCells::new(false);
-        let (lit, dark) = (Cube::at([0, 3, 12]), Cube::at([-1, 3, 12]));
+        let (lit, dark) = (Cube::at([0, 6, 24]), Cube::at([-1, 6, 24]));
         for (cube, visible) in [(lit, 1.0), (dark, 0.0)] {
-            for _ in 0..50 {
-                let draws = Count {
-                    drawn: 2.0,
-                    visible: 2.0 * visible,
-                };
-                subcells.observe(cube, 17, draws, 20, true);
-            }
+            see(&mut subcells, cube, 17, 50, visible);
         }
         subcells.refresh(&whole(20), false);
-        // 20 entries in two rows.
-        let factor = |cube: Cube, entry: usize| subcells.factors(cube).drawn[entry % 2][entry / 2];
-        assert!(subcells.factors(Cube::at([6, 6, 6])).drawn.is_empty());
-        assert!((factor(Cube::at([16, 3, -4]), 17) - 2.0_f32.sqrt()).abs() < 0.05);
-        assert!(factor(dark, 17) < 0.1 && factor(dark, 17) > 0.0);
-        assert!((factor(dark, 3) - 1.0).abs() < 0.1);
+        assert!(subcells.factors(Cube::at([12, 12, 12])).drawn.is_empty());
+        assert!((factor(&subcells, Cube::at([32, 6, -8]), 17) - 2.0_f32.sqrt()).abs() < 0.05);
+        assert!(factor(&subcells, dark, 17) < 0.1 && factor(&subcells, dark, 17) > 0.0);
+        assert!((factor(&subcells, dark, 3) - 1.0).abs() < 0.1);
         // In the larger cube around, not in the small one.
-        assert!(factor(Cube::at([3, 0, 13]), 17) > 1.3 && factor(Cube::at([13, 0, 13]), 17) < 0.2);
+        assert!(factor(&subcells, Cube::at([6, 0, 26]), 17) > 1.3);
+        assert!(factor(&subcells, Cube::at([26, 0, 26]), 17) < 0.2);
+        assert_eq!(subcells.len(), 6);
+    }
+
+    #[test]
+    fn a_cube_that_has_seen_little_believes_those_beside_it() {
+        let mut subcells = SubCells::new(false);
+        let border = 15;
+        for x in [border - 1, border, border + 1] {
+            // Light falls on one side of the border, in another large cube.
+            let visible = if x > border { 1.0 } else { 0.0 };
+            see(
+                &mut subcells,
+                Cube::at([x, 6, 24]),
+                17,
+                if x == border { 2 } else { 60 },
+                visible,
+            );
+        }
+        see(&mut subcells, Cube::at([7, 6, 24]), 17, 60, 0.0);
+        subcells.refresh(&whole(20), false);
+        let factor = |x: i32| factor(&subcells, Cube::at([x, 6, 24]), 17);
+        assert!(factor(border + 1) > 1.3 && factor(border - 1) < 0.2 && factor(7) < 0.2);
+        assert!((0.5..0.9).contains(&factor(border)), "{}", factor(border));
+        let beside = |cube: Cube| cube.beside(LEVELS).count();
+        assert_eq!(
+            [
+                beside(Cube::at([0, 0, 31])),
+                beside(Cube::at([3, 0, 7])),
+                beside(Cube::at([1, 2, 3]))
+            ],
+            [3, 5, 6]
+        );
+    }
+
+    #[test]
+    fn no_smaller_cubes_are_made_than_may_be() {
+        let mut subcells = SubCells::new(false);
+        for (layers, cubes) in [(0, 0), (2, 2), (0, 2), (LAYERS.len(), 3)] {
+            subcells.observe(Cube::at([1, 2, 3]), 0, Count::default(), 1, layers);
+            assert_eq!(subcells.len(), cubes);
+            assert!(subcells.is_sound(1, false) && subcells.is_sound(2, false) == (cubes == 0));
+        }
     }
 
     #[test]
@@ -362,12 +524,12 @@ mod tests {
                 drawn: 1.0,
                 visible: 1.0,
             };
-            subcells.observe(Cube::at([1, 2, 3]), entry, draw, 3, true);
+            subcells.observe(Cube::at([1, 2, 3]), entry, draw, 3, LAYERS.len());
         }
         let drawn = |subcells: &SubCells| {
             let of = |layer: &Layer| layer.subcells[0].counts.iter().map(|c| c.drawn).collect::<Vec<_>>();
-            let [a, b] = [of(&subcells.layers[0]), of(&subcells.layers[1])];
-            assert_eq!(a, b);
+            let [a, b, c] = subcells.layers.each_ref().map(of);
+            assert!(a == b && b == c);
             a
         };
         subcells.recut(&tree, &coarse, &fine);

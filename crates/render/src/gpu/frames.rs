@@ -41,8 +41,6 @@ pub(super) struct GpuFrames<S> {
     /// Once somebody has made do without the film; `None` in it: the device is lost.
     count_pass: OnceCell<Option<CountPass>>,
     failure: Option<RenderError>,
-    /// Whether the CPU would guide bounces.
-    unguided: bool,
 }
 
 impl<S: LightSampler> GpuFrames<S> {
@@ -57,7 +55,6 @@ impl<S: LightSampler> GpuFrames<S> {
         let pass = PathPass::new(&gpu, scene, &sampler, &packed, settings)?;
         let lesson_passes = S::LEARNS.then(|| LessonPasses::new(&gpu)).transpose()?;
         let frames = Self {
-            unguided: settings.max_bounces > 0 && sampler.guides(),
             drawn: Drawn::new(OneLight(sampler)),
             gpu,
             pass,
@@ -300,11 +297,7 @@ impl<S: LightSampler> Frames for GpuFrames<S> {
     }
 
     fn sampler_stats(&self) -> Option<SamplerStats> {
-        let mut stats = self.drawn.sampler_stats()?;
-        if self.unguided {
-            stats.skipped.push("the GPU does not guide bounces".into());
-        }
-        Some(stats)
+        self.drawn.sampler_stats()
     }
 
     fn light_records(&self, scene: &Scene) -> Vec<LightRecord> {

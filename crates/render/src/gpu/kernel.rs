@@ -17,6 +17,8 @@ pub struct Kernel<'k> {
     pub sampler: Option<&'k Packed>,
     /// Whether it uses the points of the Sobol' sequence.
     pub sobol: bool,
+    /// Values of its switches that are not the default.
+    pub switches: &'k [(&'k str, f64)],
 }
 
 impl Kernel<'_> {
@@ -37,7 +39,10 @@ impl Kernel<'_> {
             layout: None,
             module: &module,
             entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: self.switches,
+                ..Default::default()
+            },
             cache: None,
         });
         let input = storage(gpu, "input", bytemuck::cast_slice(input))?;

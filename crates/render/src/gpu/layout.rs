@@ -4,7 +4,7 @@ pub use crate::control::PixelControl;
 use crate::film::AovRecord;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
-use light_cache::{Observation, ShadingPoint};
+use light_cache::{Bounce, Observation, ShadingPoint};
 
 /// What changes from frame to frame: `FrameParams` in `shaders/record/frame.wgsl`.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -106,28 +106,37 @@ pub struct PackedObservation {
     pub unshadowed: f32,
     pub irradiance: f32,
     pub pmf: f32,
-    pub weight: u32,
+    pub bounce_radiance: f32,
 }
 
 impl PackedObservation {
     const PRIMARY: u32 = 1;
     const VISIBLE: u32 = 2;
+    const FOR_MANY: u32 = 4;
+    const BOUNCE: u32 = 8;
+    /// The first of the bits that tell the part of the hemisphere.
+    const PART: u32 = 8;
 
-    /// `None` for a slot that was not used.
-    pub(crate) fn get(&self) -> Option<Observation> {
+    /// `None` for a slot that was not used. `weight`: for how many it stands if it stands for many.
+    pub(crate) fn get(&self, weight: u32) -> Option<Observation> {
+        let is = |flag: u32| self.flags & flag != 0;
+        let bounce = Bounce {
+            part: (self.flags >> Self::PART) as u16,
+            radiance: self.bounce_radiance,
+        };
         (self.light != u32::MAX).then(|| Observation {
             point: ShadingPoint {
                 position_ws: Vec3::from(self.position_ws),
                 normal_ws: Vec3::from(self.normal_ws),
-                primary: self.flags & Self::PRIMARY != 0,
+                primary: is(Self::PRIMARY),
             },
             light: self.light,
             unshadowed: self.unshadowed,
             irradiance: self.irradiance,
             pmf: self.pmf,
-            visible: self.flags & Self::VISIBLE != 0,
-            weight: self.weight,
-            bounce: None,
+            visible: is(Self::VISIBLE),
+            weight: if is(Self::FOR_MANY) { weight } else { 1 },
+            bounce: is(Self::BOUNCE).then_some(bounce),
         })
     }
 }
@@ -163,4 +172,5 @@ pub struct Run {
     pub tile: u32,
     pub first: u32,
     pub count: u32,
+    pub weight: u32,
 }

@@ -183,7 +183,7 @@ impl Lessons {
             let kept: &[PackedObservation] = bytemuck::cast_slice(bytes);
             let of_run = |run: &Run| {
                 let all = kept.iter().skip(run.first as usize).take(run.count as usize);
-                all.filter_map(PackedObservation::get).collect()
+                all.filter_map(|packed| packed.get(run.weight)).collect()
             };
             runs.iter().map(of_run).collect()
         })
@@ -206,7 +206,7 @@ pub(super) fn read_all(
             let pixels = rows.flat_map(|y| (x0..(x0 + TILE_SIZE).min(width)).map(move |x| (y * width + x) as usize));
             pixels
                 .flat_map(|pixel| &all[pixel * slots..(pixel + 1) * slots])
-                .filter_map(PackedObservation::get)
+                .filter_map(|packed| packed.get(1))
                 .collect()
         };
         starts(height)

@@ -48,11 +48,13 @@ impl PathPass {
         settings: &Settings,
     ) -> Result<Self, RenderError> {
         let resamples = matches!(settings.method, Method::Sampled(_)) && settings.candidates > 1;
+        let guided = settings.max_bounces > 0 && sampler.guides();
         let heuristic = settings.mis.heuristic().map_or(4, |heuristic| heuristic as u32);
         let switches = vec![
             ("LEARNS", f64::from(u8::from(S::LEARNS))),
             ("CONTROLLED", f64::from(u8::from(sampler.is_controlled()))),
             ("RESAMPLES", f64::from(u8::from(resamples))),
+            ("GUIDED", f64::from(u8::from(guided))),
             ("HEURISTIC", f64::from(heuristic)),
         ];
         let scene = SceneBuffers::new(gpu, scene)?;

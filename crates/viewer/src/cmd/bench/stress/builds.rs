@@ -52,11 +52,6 @@ fn gpu(bench: &mut Bench) -> Result<()> {
             height: 36,
             method: Method::Sampled(kind),
             max_bounces: 1,
-            light: light_cache::Settings {
-                // The GPU does not guide.
-                guided_bounces: false,
-                ..Default::default()
-            },
             ..Settings::default()
         };
         let (_, first, camera) = &states[0];
