@@ -61,7 +61,7 @@ fn is_one_light(branch: u32) -> bool {
     return (branch & LIGHT_BRANCH) != 0u && branch != DISTANT_BRANCH;
 }
 
-// Where that is what is kept for a cube, or NO_FACTORS.
+// Where what is kept for one cube of a cell lies, factors or a guide, or NO_FACTORS.
 fn kept_for(key: u32) -> u32 {
     let bits = cache_word(CUT_CUBE_BITS);
     let table = cache_word(CUT_CUBES);
