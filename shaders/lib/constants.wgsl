@@ -4,6 +4,7 @@ const PI: f32 = 3.1415927;
 const FRAC_PI_2: f32 = 1.5707964;
 const FRAC_PI_4: f32 = 0.7853982;
 const FRAC_1_PI: f32 = 0.31830987;
+const SQRT_2: f32 = 1.4142135;
 const MIN_POSITIVE: f32 = 1.17549435e-38;
 const FLT_MAX: f32 = 3.4028234e38;
 // Distances that have no end. WGSL has no infinity.

@@ -1,4 +1,5 @@
 // Directions of a hemisphere, drawn more often where much light comes from: a guide is 4 starts of rings, then 16 starts of sectors of each.
+#import "lib/constants.wgsl"
 #import "lib/hemisphere.wgsl"
 #import "light_cache/bindings.wgsl"
 
@@ -14,7 +15,7 @@ const SECTORS: u32 = 16u;
 const PARTS: u32 = RINGS * SECTORS;
 // Tangent of an eighth of pi.
 // twin: crates/sampling/src/guide.rs TAN
-const TAN: f32 = 0.41421354;
+const TAN: f32 = SQRT_2 - 1.0;
 // twin: crates/sampling/src/guide.rs BELOW_ONE
 const BELOW_ONE: f32 = 0.99999994;
 
