@@ -16,7 +16,7 @@ const PARTS: u32 = RINGS * SECTORS;
 // Tangent of an eighth of pi.
 // twin: crates/sampling/src/guide.rs TAN
 const TAN: f32 = SQRT_2 - 1.0;
-// twin: crates/sampling/src/guide.rs BELOW_ONE
+// The largest number below 1.
 const BELOW_ONE: f32 = 0.99999994;
 
 struct GuidedDirection {

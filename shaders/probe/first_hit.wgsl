@@ -17,7 +17,7 @@ fn probe_pixel(pixel: u32) {
 
 // At the path's first hit, `distance` metres away, `light` having been chosen there.
 // twin: crates/render/src/path.rs first_hit
-// twin: crates/render/src/film.rs add_aovs
+// twin: crates/render/src/film/tile.rs add_aovs
 fn probe_first_hit(pixel: u32, surface: Surface, distance: f32, light: u32) {
     let albedo = surface.bsdf.diffuse + surface.bsdf.f0;
     let normal = surface.bsdf.normal_ws;
