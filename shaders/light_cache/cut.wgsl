@@ -15,7 +15,7 @@ const CUT_CELLS: u32 = 21u;
 const CUT_CUBES: u32 = 22u;
 const CUT_CUBE_BITS: u32 = 23u;
 
-// twin: crates/light-cache/src/adaptive/weights.rs LANES
+// twin: crates/light-cache/src/adaptive/row.rs LANES
 const LANES: u32 = 16u;
 // twin: crates/light-cache/src/adaptive/branch.rs LIGHT
 const LIGHT_BRANCH: u32 = 1u << 31u;
@@ -199,7 +199,7 @@ fn entry_factors(cut: Cut, entry: u32) -> vec2<f32> {
 }
 
 // What the entry is expected to bring, by channel, over what it weighs, both without the factors of cubes.
-// twin: crates/light-cache/src/adaptive/weights.rs Expected
+// twin: crates/light-cache/src/adaptive/row.rs Expected
 fn entry_expected(cut: Cut, entry: u32) -> vec3<f32> {
     if cut.expected == NO_FACTORS || entry >= cut.count {
         return vec3<f32>(0.0);

@@ -18,7 +18,7 @@ const CELL_ANGLE: f32 = 0.5;
 const SECONDARY_SCALE: f32 = 4.0;
 // twin: crates/light-cache/src/adaptive/grid.rs MAX_LEVEL
 const MAX_LEVEL: u32 = 31u;
-// twin: crates/light-cache/src/adaptive/subcells.rs LEVELS
+// twin: crates/light-cache/src/adaptive/cube.rs LEVELS
 const LEVELS: u32 = 5u;
 
 struct Spot {

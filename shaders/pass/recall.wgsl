@@ -1,6 +1,7 @@
 // What earlier pictures knew about the light on the surfaces of this one: crates/render/src/clean/history.rs. A workgroup is a block, in
 // which history is tested against the new samples.
 #import "clean/guide.wgsl"
+#import "clean/kept.wgsl"
 #import "clean/projection.wgsl"
 #import "lib/constants.wgsl"
 #import "record/clean.wgsl"
@@ -12,10 +13,6 @@
 // The new samples' light, then the mean with what was known, and its variance.
 @group(3) @binding(5) var<storage, read_write> light: array<vec4<f32>>;
 
-// twin: crates/render/src/clean/history.rs LONGEST
-const LONGEST: f32 = 4.0;
-// twin: crates/render/src/clean/history.rs INDEPENDENT
-const INDEPENDENT: f32 = 64.0;
 // twin: crates/render/src/clean/history.rs ALIKE_NORMALS
 const ALIKE_NORMALS: f32 = 0.9;
 // twin: crates/render/src/clean/history.rs ALIKE_PLANES
@@ -209,8 +206,7 @@ fn recall(@builtin(global_invocation_id) id: vec3<u32>, @builtin(local_invocatio
         return;
     }
     if is_surface(guide) {
-        let longest = LONGEST * max(1.0 - clean.spp / INDEPENDENT, 0.0);
-        known = with_samples(known, seen, clean.spp, min(longest, known.samples) * trusted);
+        known = with_samples(known, seen, clean.spp, samples_kept(known.samples, clean.spp) * trusted);
     }
     known_now[pixel] = known;
     light[pixel] = vec4<f32>(known.irradiance, variance_known(known));

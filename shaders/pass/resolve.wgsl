@@ -1,4 +1,5 @@
 // Edges smoothed over time: crates/render/src/clean/resolve.rs.
+#import "clean/kept.wgsl"
 #import "clean/projection.wgsl"
 #import "lib/constants.wgsl"
 #import "record/clean.wgsl"
@@ -10,10 +11,6 @@
 @group(3) @binding(4) var<storage, read> shown_before: array<vec4<f32>>;
 @group(3) @binding(5) var<storage, read_write> shown: array<vec4<f32>>;
 
-// twin: crates/render/src/clean/resolve.rs LONGEST
-const LONGEST: f32 = 4.0;
-// twin: crates/render/src/clean/resolve.rs INDEPENDENT
-const INDEPENDENT: f32 = 64.0;
 // twin: crates/render/src/clean/resolve.rs CLIP
 const CLIP: f32 = 1.0;
 
@@ -154,7 +151,7 @@ fn resolve(@builtin(global_invocation_id) id: vec3<u32>) {
         shown[pixel] = vec4<f32>(radiance, clean.spp);
         return;
     }
-    let kept = min(past.samples, LONGEST) * max(1.0 - clean.spp / INDEPENDENT, 0.0);
+    let kept = samples_kept(past.samples, clean.spp);
     let known = drawn_towards(compress(past.radiance * scale), around.mean, around.deviation * CLIP);
     let mixed = mix(known, compress(radiance * scale), clean.spp / (clean.spp + kept));
     shown[pixel] = vec4<f32>(expand(mixed) / scale, clean.spp + kept);

@@ -6,11 +6,15 @@
 //! finished by the light tree's own descent at the point.
 
 use super::branch::Branch;
+use super::cube::Cube;
 use super::directions::Directions;
 use super::emitter::Emitter;
+use super::entry::Entry;
 use super::palette::Palette;
-use super::subcells::{Count, Cube, SubCells};
-use super::weights::{Factors, Part, View, Wanted, Weighed, Weights};
+use super::row::Weighed;
+use super::subcell::Count;
+use super::subcells::SubCells;
+use super::weights::{Factors, Part, View, Wanted, Weights};
 use crate::Observation;
 use crate::state::is_amount;
 use crate::tree::{Descent, MAX_LEAF_LIGHTS, Receiver, Tree, UNIT, probability};
@@ -21,101 +25,14 @@ use sampling::HemisphereGuide;
 pub(super) const MAX_ENTRIES: usize = 96;
 /// Entries of a new cell's cut.
 const FIRST_ENTRIES: usize = 72;
-/// How many observations the prior is worth.
-const PRIOR_COUNT: f32 = 2.0;
-/// Part of the prior that does not fade with what was learned. Higher values waste samples on hidden lights; lower values
-/// leave bright specks where a light reaches a few points of a cell only.
-const LASTING_PRIOR: f32 = 0.1;
 /// Entries of at least this share of the whole weight that are clusters are split.
 const SPLIT_SHARE: f32 = 0.5 / MAX_ENTRIES as f32;
 /// Sibling entries that together have less than this share of the whole weight may be merged.
 const MERGE_SHARE: f32 = 0.05 / MAX_ENTRIES as f32;
-/// Contributions are counted as no more than this many times what is expected of the entry, so that one spike does not
-/// own the cell. Statistics only: the image is not clamped.
-const SPIKE: f32 = 16.0;
 /// Points that stand for the cell where an entry's weight is wanted without a point.
 const PROBES: usize = 8;
 /// Weights are made anew when the cell has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
-
-/// A part of the light tree and what was seen of it here. What is seen is counted as a ratio: irradiance divided by the
-/// probability of the light within the entry, over what the emitter was estimated to send to the point.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub(super) struct Entry {
-    /// Which part of the light tree.
-    pub(super) branch: Branch,
-    /// Strength that the tree believed in when the entry was made.
-    believed: f32,
-    /// Root mean square of the emitter's estimate over the cell's probes.
-    scale: f32,
-    /// Times drawn.
-    pub(super) drawn: f32,
-    /// Times drawn and visible.
-    pub(super) visible: f32,
-    /// Sum of the ratios, visible ones only.
-    sum: f32,
-    /// Sum of their squares.
-    sum_sq: f32,
-    /// Root mean square ratio expected beforehand.
-    prior: f32,
-}
-
-impl Entry {
-    fn is_sound(&self) -> bool {
-        let amounts = [
-            self.believed,
-            self.scale,
-            self.drawn,
-            self.visible,
-            self.sum,
-            self.sum_sq,
-            self.prior,
-        ];
-        amounts.into_iter().all(is_amount)
-    }
-
-    /// What was learned: estimated root mean square ratio. The prior fades as 1 / n where nothing was ever visible, as it
-    /// is weighed down once for the count and once for what the count taught, and in the long run as n^-1/2 with a
-    /// small constant: what was not visible so far may still be, to few points.
-    fn ratio(&self) -> f32 {
-        let n = self.drawn + PRIOR_COUNT;
-        let fade = PRIOR_COUNT / n + LASTING_PRIOR;
-        ((self.sum_sq + PRIOR_COUNT * fade * self.prior * self.prior) / n).sqrt()
-    }
-
-    /// Estimated mean ratio over the root mean square. Of what was never seen nothing is expected.
-    fn mean_over_ratio(&self) -> f32 {
-        let mean = self.sum / (self.drawn + PRIOR_COUNT);
-        if mean > 0.0 { mean / self.ratio() } else { 0.0 }
-    }
-
-    /// Weight in the cell as a whole.
-    pub(super) fn weight(&self) -> f32 {
-        self.ratio() * self.scale
-    }
-
-    /// The emitter, as strong as was believed before anything was seen.
-    fn emitter(&self, tree: &Tree) -> Emitter {
-        Emitter::of(tree, self.branch).with_strength(self.believed)
-    }
-
-    /// The emitter, as strong as was learned.
-    fn learned(&self, tree: &Tree) -> Emitter {
-        Emitter::of(tree, self.branch).with_strength(self.believed * self.ratio())
-    }
-
-    /// Takes note of a ratio, `times` times. `most`: what no light can exceed by much.
-    fn observe(&mut self, ratio: f32, visible: bool, most: f32, times: f32) {
-        let expected = self.prior.max((self.sum_sq / self.drawn.max(1.0)).sqrt());
-        self.drawn += times;
-        if visible {
-            self.visible += times;
-            let ratio = ratio.min((SPIKE * expected).max(most));
-            self.sum += times * ratio;
-            self.sum_sq += times * ratio * ratio;
-        }
-    }
-}
 
 /// Which cell a cell is, and since when.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -220,16 +137,7 @@ impl Cell {
     /// An entry of which nothing is known but what the tree believes.
     fn unseen(&self, tree: &Tree, branch: Branch) -> Entry {
         let emitter = Emitter::of(tree, branch);
-        Entry {
-            branch,
-            believed: emitter.strength(),
-            scale: self.scale(&emitter),
-            drawn: 0.0,
-            visible: 0.0,
-            sum: 0.0,
-            sum_sq: 0.0,
-            prior: 1.0,
-        }
+        Entry::unseen(branch, &emitter, self.scale(&emitter))
     }
 
     /// Replaces entry `j`, a cluster, by its parts, which share the weight that it had.
@@ -238,7 +146,7 @@ impl Cell {
         let (branches, count) = parent.branch.children(tree);
         let mut parts = branches.map(|branch| self.unseen(tree, branch));
         let parts = &mut parts[..count];
-        if parent.drawn > 0.0 {
+        if parent.count.drawn > 0.0 {
             let sum: f32 = parts.iter().map(|e| e.scale).sum();
             let ratio = if sum > 0.0 {
                 parent.weight() / sum
@@ -352,11 +260,7 @@ impl Cell {
     }
 
     fn counts(&self) -> Vec<Count> {
-        let of = |entry: &Entry| Count {
-            drawn: entry.drawn,
-            visible: entry.visible,
-        };
-        self.entries.iter().map(of).collect()
+        self.entries.iter().map(|entry| entry.count).collect()
     }
 
     /// Whether it can be a cell of these `lights` after so many `frames`.

@@ -1,8 +1,10 @@
 //! All cells: which observation belongs to which, and making them.
 
-use super::cell::{Cell, Entry, Lights, MayGrow, Nearby, Origin};
+use super::cell::{Cell, Lights, MayGrow, Nearby, Origin};
+use super::cube::Cube;
+use super::entry::Entry;
 use super::grid::{Grid, NO_CELL, Spot, dominant_axis};
-use super::subcells::{self, Cube};
+use super::subcells;
 use crate::tree::{Receiver, Tree};
 use crate::{CellRecord, Observation, ShadingPoint};
 use glam::Vec3;
@@ -109,8 +111,9 @@ impl Cells {
                     light: tree.light_at(entry.branch.first(tree)),
                     lights: entry.branch.count(tree),
                     probability: f64::from(entry.weight()) / f64::from(total.max(f32::MIN_POSITIVE)),
-                    visible_fraction: (entry.drawn > 0.0).then(|| f64::from(entry.visible / entry.drawn)),
-                    samples: entry.drawn as u64,
+                    visible_fraction: (entry.count.drawn > 0.0)
+                        .then(|| f64::from(entry.count.visible / entry.count.drawn)),
+                    samples: entry.count.drawn as u64,
                     age: frame - cell.origin.frame,
                 })
             })

@@ -1,6 +1,6 @@
 //! An interval cut in proportion to weights, in whole numbers.
 
-use super::weights::{LANES, Lanes};
+use super::row::{LANES, Lanes};
 
 /// Entries whose running sums are worked out one after the other; groups of them are worked out side by side.
 const GROUP: usize = 4;

@@ -7,7 +7,7 @@
 //! directions are drawn in proportion to the product with the cosine and keep the strata of their random numbers. Places within a cell count
 //! for themselves, with the whole cell as their prior.
 
-use super::subcells::Cube;
+use super::cube::Cube;
 use crate::Bounce;
 use crate::state::is_amount;
 use sampling::HemisphereGuide;

@@ -4,7 +4,7 @@
 //! pixels everywhere), told apart by the dominant direction of the normal and by first or later hit. Cf. Binder, Fricke and
 //! Keller 2019 (Massively parallel path space filtering, section 3) for hashing position, level and normal.
 
-use super::subcells::{self, Cube};
+use super::cube::{Cube, LEVELS};
 use crate::ShadingPoint;
 use crate::packed::align;
 use glam::Vec3;
@@ -60,15 +60,15 @@ impl Grid {
         let wanted = point.position_ws.distance(self.eye_ws) * CELL_ANGLE * scale;
         // The exponent of the ratio, read from its bits: floor(log2), at least 0.
         let level = ((wanted / self.min_size).max(1.0).to_bits() >> 23).saturating_sub(127);
-        let level = level.clamp(subcells::LEVELS, MAX_LEVEL);
+        let level = level.clamp(LEVELS, MAX_LEVEL);
         let position = (point.position_ws - self.center_ws) * self.inverse_min_size;
-        let [x, y, z] = (position * power_of_two(subcells::LEVELS as i32 - level as i32))
+        let [x, y, z] = (position * power_of_two(LEVELS as i32 - level as i32))
             .to_array()
             .map(floor);
         let kind = dominant_axis(point.normal_ws) << 1 | u32::from(point.primary);
         // 3 x 20 bits of position; the rest is mixed in. Two cells that clash share a distribution: that costs noise and
         // nothing else.
-        let bits = |c: i32| u64::from((c >> subcells::LEVELS) as u32 & 0xf_ffff);
+        let bits = |c: i32| u64::from((c >> LEVELS) as u32 & 0xf_ffff);
         let tag = u64::from(mix(level << 8 | kind));
         Spot {
             key: (bits(x) | bits(y) << 20 | bits(z) << 40) ^ (tag << 32 | tag),

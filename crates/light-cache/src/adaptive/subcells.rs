@@ -6,9 +6,9 @@
 //! and with what the cubes beside it have seen for as long as it has seen little itself.
 
 use super::branch::Branch;
-use super::weights::{Factors, LANES, Lanes};
-use crate::Observation;
-use crate::state::is_amount;
+use super::cube::{Cube, LEVELS};
+use super::subcell::{Count, NONE, SubCell};
+use super::weights::Factors;
 use crate::tree::Tree;
 
 /// Cubes of the layers along an edge of the cell: 2 to this power, largest cubes first. Higher values follow finer shadows; lower values
@@ -16,12 +16,9 @@ use crate::tree::Tree;
 pub(super) const LAYERS: [u32; 3] = [LARGE_LAYER, MIDDLE_LAYER, LEVELS];
 const LARGE_LAYER: u32 = 2;
 const MIDDLE_LAYER: u32 = 4;
-/// Of the smallest cubes.
-pub(super) const LEVELS: u32 = 5;
-/// How many observations the share around a cube is worth in it.
-const PRIOR_COUNT: f32 = 4.0;
-/// Part of the prior that does not fade, as in the whole cell: what was not visible so far may still be, to few points.
-const LASTING_PRIOR: f32 = 0.03;
+/// How many observations a cube of each layer needs around it before it is made. Higher values save time and memory while little is known;
+/// lower values follow fine shadows sooner.
+const SEEN_BEFORE: [f32; LAYERS.len()] = [0.0, 0.0, 64.0];
 /// Part of what the six cubes beside a cube have seen that counts in it too. Higher values learn faster; lower values keep the borders of shadows.
 const BESIDE_SHARE: f32 = 0.5;
 /// How many observations of an entry that is worth at most: the same trade.
@@ -30,173 +27,6 @@ const BESIDE_COUNT: f32 = 8.0;
 /// q, a draw without one brings V with a mean square of q, and with one V - q with a mean square of q (1 - q): higher values trust
 /// that; lower values allow for all else that an entry's contribution varies by.
 const CERTAINTY: f32 = 0.8;
-/// Factors are made anew when the cube has seen this many times more than when they were last made.
-const REBUILD_GROWTH: f32 = 1.15;
-/// No cube yet.
-const NONE: u16 = u16::MAX;
-
-/// Which of the smallest cubes of its cell a point is in.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
-pub(super) struct Cube([u16; 3]);
-
-impl Cube {
-    /// By whole numbers of cubes along the axes, of which the lowest bits count.
-    #[inline]
-    pub(super) fn at(position: [i32; 3]) -> Self {
-        Self(position.map(|c| c as u16 & ((1 << LEVELS) - 1)))
-    }
-
-    /// Which cube of a layer that is in, if the layer has 2^`bits` along an edge.
-    #[inline]
-    pub(super) fn within(self, bits: u32) -> usize {
-        self.part(bits, bits)
-    }
-
-    /// The same, but counted in a cube around it that has 2^`step` of these along an edge.
-    #[inline]
-    fn part(self, bits: u32, step: u32) -> usize {
-        let [x, y, z] = self.0.map(|c| usize::from(c >> (LEVELS - bits)) & ((1 << step) - 1));
-        x | y << step | z << (2 * step)
-    }
-
-    /// The cubes beside it in such a layer, as far as they are in the cell.
-    fn beside(self, bits: u32) -> impl Iterator<Item = Self> {
-        let size = 1 << (LEVELS - bits);
-        let moved = move |axis: usize, forward: bool| {
-            let mut position = self.0;
-            position[axis] = if forward {
-                position[axis] + size
-            } else {
-                position[axis].checked_sub(size)?
-            };
-            (position[axis] < 1 << LEVELS).then_some(Self(position))
-        };
-        (0..3).flat_map(move |axis| {
-            [false, true]
-                .into_iter()
-                .filter_map(move |forward| moved(axis, forward))
-        })
-    }
-}
-
-/// What was seen of one entry.
-#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub(super) struct Count {
-    /// Times drawn.
-    pub(super) drawn: f32,
-    /// Times drawn and visible.
-    pub(super) visible: f32,
-}
-
-impl Count {
-    /// What one observation says.
-    pub(super) fn of(observation: &Observation) -> Self {
-        let drawn = observation.weight as f32;
-        let visible = if observation.visible { drawn } else { 0.0 };
-        Self { drawn, visible }
-    }
-
-    /// Visible share, given what is expected.
-    fn share(self, expected: f32) -> f32 {
-        let n = self.drawn + PRIOR_COUNT;
-        // The prior counts less the longer nothing is seen, as in `Entry::ratio`.
-        let fade = PRIOR_COUNT / n + LASTING_PRIOR;
-        (self.visible + PRIOR_COUNT * fade.min(1.0) * expected) / n
-    }
-}
-
-/// One cube.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-struct SubCell {
-    /// Number of the one around it in the layer before.
-    around: u16,
-    /// One of the smallest cubes in it.
-    place: Cube,
-    /// Of every entry of the cell's cut.
-    counts: Vec<Count>,
-    /// [`Factors::drawn`]; empty before anything is known.
-    drawn: Vec<Lanes>,
-    /// [`Factors::expected`]: visible share here over that in the whole cell.
-    expected: Vec<Lanes>,
-    seen: f32,
-    built_at: f32,
-}
-
-impl SubCell {
-    /// Nothing seen of so many `entries`.
-    fn new(around: u16, place: Cube, entries: usize) -> Self {
-        Self {
-            around,
-            place,
-            counts: vec![Count::default(); entries],
-            drawn: Vec::new(),
-            expected: Vec::new(),
-            seen: 0.0,
-            built_at: 0.0,
-        }
-    }
-
-    /// Takes note of draws of an entry.
-    fn observe(&mut self, entry: usize, draws: Count) {
-        let count = &mut self.counts[entry];
-        count.drawn += draws.drawn;
-        count.visible += draws.visible;
-        self.seen += draws.drawn;
-    }
-
-    /// Makes the factors. `counts`: what was seen of each entry, here and beside; `whole`: what the whole cell has seen of it; `around`: how
-    /// much more or less the cube around this one expects of each, empty for 1; `certainty`: see [`CERTAINTY`], 0 without a control variate.
-    fn build(&mut self, counts: &[Count], whole: &[Count], around: &[Lanes], certainty: f32) {
-        self.built_at = self.seen;
-        let rows = whole.len().div_ceil(LANES);
-        for factors in [&mut self.drawn, &mut self.expected] {
-            factors.clear();
-            factors.resize(rows, [1.0; LANES]);
-        }
-        for (entry, (own, whole)) in counts.iter().zip(whole).enumerate() {
-            // As if it had been visible once in half as many draws more: never 0.
-            let share = (whole.visible + 0.5) / (whole.drawn + 1.0);
-            let (row, lane) = (entry % rows, entry / rows);
-            let around = around.get(row).map_or(1.0, |row| row[lane]);
-            let own = own.share(share * around);
-            self.expected[row][lane] = own / share;
-            self.drawn[row][lane] = (own / share * (1.0 - certainty * own.min(1.0))).sqrt();
-        }
-    }
-
-    #[inline]
-    fn factors(&self) -> Factors<'_> {
-        Factors {
-            drawn: &self.drawn,
-            expected: &self.expected,
-        }
-    }
-
-    /// Whether it can be one of a cut into so many `entries`, with so many cubes in the layer `before`; `None`: there is no such layer.
-    fn is_sound(&self, entries: usize, before: Option<usize>) -> bool {
-        let rows = entries.div_ceil(LANES);
-        let factors = [&self.drawn, &self.expected];
-        before.map_or(self.around == NONE, |before| usize::from(self.around) < before)
-            && self.place.0.iter().all(|c| *c < 1 << LEVELS)
-            && self.counts.len() == entries
-            && self
-                .counts
-                .iter()
-                .all(|count| is_amount(count.drawn) && is_amount(count.visible))
-            && (factors.iter().all(|lanes| lanes.is_empty()) || factors.iter().all(|lanes| lanes.len() == rows))
-            && factors
-                .iter()
-                .all(|lanes| lanes.as_flattened().iter().copied().all(is_amount))
-            && is_amount(self.seen)
-            && is_amount(self.built_at)
-    }
-
-    fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + self.counts.capacity() * size_of::<Count>()
-            + (self.drawn.capacity() + self.expected.capacity()) * size_of::<Lanes>()
-    }
-}
 
 /// All cubes of one size in which anything was seen.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -259,16 +89,16 @@ impl SubCells {
     /// By what a cube differs from the cell.
     #[inline]
     pub(super) fn factors(&self, cube: Cube) -> Factors<'_> {
-        let mut factors = Factors::default();
+        let mut smallest = None;
         let mut around = 0;
         for (layer, (bits, step)) in self.layers.iter().zip(steps()) {
             let Some(number) = layer.find(around, cube, bits, step) else {
                 break;
             };
-            factors = layer.subcells[number].factors();
+            smallest = Some(&layer.subcells[number]);
             around = number;
         }
-        factors
+        smallest.map_or_else(Factors::default, SubCell::factors)
     }
 
     /// All factors, each with the number of its layer and that of its cube in the layer.
@@ -281,9 +111,9 @@ impl SubCells {
             })
     }
 
-    /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing in as many layers as `may_grow`.
+    /// Takes note of draws of an entry, one of `entries`. Cubes are made where they are missing in as many layers as `may_grow`, each once [enough](SEEN_BEFORE) was seen around it.
     pub(super) fn observe(&mut self, cube: Cube, entry: usize, draws: Count, entries: usize, may_grow: usize) {
-        let mut around = NONE;
+        let (mut around, mut seen_around) = (NONE, 0.0);
         for (index, (bits, step)) in steps().enumerate() {
             let (layer, finer) = self.layers[index..]
                 .split_first_mut()
@@ -291,7 +121,7 @@ impl SubCells {
             let whole = if index == 0 { 0 } else { usize::from(around) };
             let number = &mut layer.numbers[whole << (3 * step) | cube.part(bits, step)];
             if *number == NONE {
-                if index >= may_grow {
+                if index >= may_grow || seen_around < SEEN_BEFORE[index] {
                     return;
                 }
                 *number = layer.subcells.len() as u16;
@@ -301,7 +131,9 @@ impl SubCells {
                 }
             }
             around = *number;
-            layer.subcells[usize::from(around)].observe(entry, draws);
+            let subcell = &mut layer.subcells[usize::from(around)];
+            subcell.observe(entry, draws);
+            seen_around = subcell.seen();
         }
     }
 
@@ -310,7 +142,7 @@ impl SubCells {
         for index in 0..LAYERS.len() {
             for number in 0..self.layers[index].subcells.len() {
                 let subcell = &self.layers[index].subcells[number];
-                if all || subcell.seen >= REBUILD_GROWTH * subcell.built_at {
+                if all || subcell.is_due() {
                     let counts = self.counts(index, subcell);
                     let (before, rest) = self.layers.split_at_mut(index);
                     let subcell = &mut rest[0].subcells[number];
@@ -426,6 +258,12 @@ mod tests {
     use super::*;
     use crate::testing::mixed_lights;
 
+    /// So that cubes of all layers are made at once.
+    const ENOUGH: Count = Count {
+        drawn: SEEN_BEFORE[2],
+        visible: SEEN_BEFORE[2],
+    };
+
     fn whole(entries: usize) -> Vec<Count> {
         vec![
             Count {
@@ -456,7 +294,7 @@ mod tests {
         let mut subcells = SubCells::new(false);
         let (lit, dark) = (Cube::at([0, 6, 24]), Cube::at([-1, 6, 24]));
         for (cube, visible) in [(lit, 1.0), (dark, 0.0)] {
-            see(&mut subcells, cube, 17, 50, visible);
+            see(&mut subcells, cube, 17, 200, visible);
         }
         subcells.refresh(&whole(20), false);
         assert!(subcells.factors(Cube::at([12, 12, 12])).drawn.is_empty());
@@ -489,24 +327,25 @@ mod tests {
         let factor = |x: i32| factor(&subcells, Cube::at([x, 6, 24]), 17);
         assert!(factor(border + 1) > 1.3 && factor(border - 1) < 0.2 && factor(7) < 0.2);
         assert!((0.5..0.9).contains(&factor(border)), "{}", factor(border));
-        let beside = |cube: Cube| cube.beside(LEVELS).count();
-        assert_eq!(
-            [
-                beside(Cube::at([0, 0, 31])),
-                beside(Cube::at([3, 0, 7])),
-                beside(Cube::at([1, 2, 3]))
-            ],
-            [3, 5, 6]
-        );
     }
 
     #[test]
     fn no_smaller_cubes_are_made_than_may_be() {
         let mut subcells = SubCells::new(false);
         for (layers, cubes) in [(0, 0), (2, 2), (0, 2), (LAYERS.len(), 3)] {
-            subcells.observe(Cube::at([1, 2, 3]), 0, Count::default(), 1, layers);
+            subcells.observe(Cube::at([1, 2, 3]), 0, ENOUGH, 1, layers);
             assert_eq!(subcells.len(), cubes);
             assert!(subcells.is_sound(1, false) && subcells.is_sound(2, false) == (cubes == 0));
+        }
+    }
+
+    #[test]
+    fn the_smallest_cubes_wait_until_enough_was_seen_around_them() {
+        let mut subcells = SubCells::new(false);
+        for (drawn, cubes) in [(SEEN_BEFORE[2] - 1.0, 2), (1.0, 3)] {
+            let draws = Count { drawn, visible: 0.0 };
+            subcells.observe(Cube::at([1, 2, 3]), 0, draws, 1, LAYERS.len());
+            assert_eq!(subcells.len(), cubes);
         }
     }
 
@@ -520,11 +359,7 @@ mod tests {
         fine.extend(&coarse[1..]);
         let mut subcells = SubCells::new(false);
         for entry in [0, 0, 1] {
-            let draw = Count {
-                drawn: 1.0,
-                visible: 1.0,
-            };
-            subcells.observe(Cube::at([1, 2, 3]), entry, draw, 3, LAYERS.len());
+            subcells.observe(Cube::at([1, 2, 3]), entry, ENOUGH, 3, LAYERS.len());
         }
         let drawn = |subcells: &SubCells| {
             let of = |layer: &Layer| layer.subcells[0].counts.iter().map(|c| c.drawn).collect::<Vec<_>>();
@@ -534,14 +369,17 @@ mod tests {
         };
         subcells.recut(&tree, &coarse, &fine);
         let now = drawn(&subcells);
-        assert_eq!((now.len(), now[count], now[count + 1]), (count + 2, 1.0, 0.0));
-        assert!((now[..count].iter().sum::<f32>() - 2.0).abs() < 1e-5 && now[..count].iter().all(|&n| n > 0.0));
+        assert_eq!((now.len(), now[count], now[count + 1]), (count + 2, ENOUGH.drawn, 0.0));
+        assert!(
+            (now[..count].iter().sum::<f32>() - 2.0 * ENOUGH.drawn).abs() < 1e-3
+                && now[..count].iter().all(|&n| n > 0.0)
+        );
         subcells.recut(&tree, &fine, &coarse);
         assert!(
             drawn(&subcells)
                 .iter()
                 .zip([2.0, 1.0, 0.0])
-                .all(|(a, b)| (a - b).abs() < 1e-5)
+                .all(|(a, b)| (a - b * ENOUGH.drawn).abs() < 1e-3)
         );
     }
 }

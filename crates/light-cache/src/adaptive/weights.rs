@@ -8,48 +8,12 @@
 use super::branch::Branch;
 use super::cut::Cut;
 use super::emitter::Emitter;
-use crate::state::is_amount;
+use super::row::{Attenuation, Expected, LANES, Lanes, Row, Weighed};
 use crate::tree::Receiver;
 use glam::Vec3;
 
-/// Entries of a row.
-pub(super) const LANES: usize = 16;
 /// Rows of the longest cut.
 const MAX_ROWS: usize = super::cell::MAX_ENTRIES.div_ceil(LANES);
-
-/// A number for every lane of a row.
-pub(super) type Lanes = [f32; LANES];
-
-/// One entry of every lane.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-#[repr(C, align(64))]
-struct Row {
-    center: [Lanes; 3],
-    axis: [Lanes; 3],
-    radius: Lanes,
-    quarter_inverse_radius: Lanes,
-    depth: Lanes,
-    quarter_inverse_depth: Lanes,
-    one_sided: Lanes,
-    isotropic: Lanes,
-    weight: Lanes,
-    everywhere: Lanes,
-    branch: [Branch; LANES],
-}
-
-/// What rows with spots and lights of limited range have besides.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-#[repr(C, align(64))]
-struct Attenuation {
-    cone_scale: Lanes,
-    cone_offset: Lanes,
-    inverse_range_sq: Lanes,
-}
-
-/// What entries are expected to bring, by channel, over what they weigh, both without the factors of cubes.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
-#[repr(C, align(64))]
-struct Expected([Lanes; 3]);
 
 /// A cut, ready to be evaluated.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
@@ -59,17 +23,6 @@ pub(super) struct Weights {
     attenuation: Vec<Attenuation>,
     /// Empty if there is no control variate.
     expected: Vec<Expected>,
-}
-
-/// An entry of a cut.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Weighed {
-    /// What it stands for.
-    pub(super) branch: Branch,
-    /// What it sends to a point, in proportion to how often it is to be drawn there.
-    pub(super) emitter: Emitter,
-    /// What it is expected to bring, by channel, over that.
-    pub(super) expected: Vec3,
 }
 
 /// By what a place within a cell differs from the cell, entries laid out as in [`Weights`]; both empty for 1.
@@ -123,64 +76,6 @@ pub(super) struct Expectation {
     pub(super) own: Vec3,
 }
 
-impl Row {
-    #[inline(always)]
-    fn emitter(&self, lane: usize) -> Emitter {
-        Emitter {
-            center: Vec3::new(self.center[0][lane], self.center[1][lane], self.center[2][lane]),
-            axis: Vec3::new(self.axis[0][lane], self.axis[1][lane], self.axis[2][lane]),
-            radius: self.radius[lane],
-            quarter_inverse_radius: self.quarter_inverse_radius[lane],
-            depth: self.depth[lane],
-            quarter_inverse_depth: self.quarter_inverse_depth[lane],
-            one_sided: self.one_sided[lane],
-            isotropic: self.isotropic[lane],
-            weight: self.weight[lane],
-            everywhere: self.everywhere[lane],
-            ..Emitter::DARK
-        }
-    }
-}
-
-impl Row {
-    fn is_sound(&self) -> bool {
-        let Self {
-            center,
-            axis,
-            radius,
-            quarter_inverse_radius,
-            depth,
-            quarter_inverse_depth,
-            one_sided,
-            isotropic,
-            weight,
-            everywhere,
-            branch: _,
-        } = self;
-        let amounts = [
-            radius,
-            quarter_inverse_radius,
-            depth,
-            quarter_inverse_depth,
-            one_sided,
-            isotropic,
-            weight,
-            everywhere,
-        ];
-        [center, axis]
-            .iter()
-            .all(|xyz| xyz.as_flattened().iter().all(|x| x.is_finite()))
-            && amounts.iter().all(|lanes| lanes.iter().copied().all(is_amount))
-    }
-}
-
-impl Attenuation {
-    fn is_sound(&self) -> bool {
-        let numbers = [self.cone_scale, self.cone_offset, self.inverse_range_sq];
-        numbers.as_flattened().iter().all(|x| x.is_finite())
-    }
-}
-
 impl Weights {
     /// The cut of `entries`, in tree order; at most as many as a cell may have. `controlled`: with what is expected of them.
     pub(super) fn new(entries: &[Weighed], controlled: bool) -> Self {
@@ -199,31 +94,12 @@ impl Weights {
                     expected: Vec3::ZERO,
                 })
             });
-            let lanes = |value: fn(&Emitter) -> f32| of.map(|entry| value(&entry.emitter));
-            weights.rows.push(Row {
-                center: [lanes(|e| e.center.x), lanes(|e| e.center.y), lanes(|e| e.center.z)],
-                axis: [lanes(|e| e.axis.x), lanes(|e| e.axis.y), lanes(|e| e.axis.z)],
-                radius: lanes(|e| e.radius),
-                quarter_inverse_radius: lanes(|e| e.quarter_inverse_radius),
-                depth: lanes(|e| e.depth),
-                quarter_inverse_depth: lanes(|e| e.quarter_inverse_depth),
-                one_sided: lanes(|e| e.one_sided),
-                isotropic: lanes(|e| e.isotropic),
-                weight: lanes(|e| e.weight),
-                everywhere: lanes(|e| e.everywhere),
-                branch: of.map(|entry| entry.branch),
-            });
+            weights.rows.push(Row::of(&of));
             if attenuated {
-                weights.attenuation.push(Attenuation {
-                    cone_scale: lanes(|e| e.cone_scale),
-                    cone_offset: lanes(|e| e.cone_offset),
-                    inverse_range_sq: lanes(|e| e.inverse_range_sq),
-                });
+                weights.attenuation.push(Attenuation::of(&of));
             }
             if controlled {
-                weights.expected.push(Expected(
-                    [0, 1, 2].map(|channel| of.map(|entry| entry.expected[channel])),
-                ));
+                weights.expected.push(Expected::of(&of));
             }
         }
         weights
@@ -235,9 +111,7 @@ impl Weights {
             let (row, lane) = (entry % self.rows.len(), entry / self.rows.len());
             let mut emitter = self.rows[row].emitter(lane);
             if let Some(attenuation) = self.attenuation.get(row) {
-                emitter.cone_scale = attenuation.cone_scale[lane];
-                emitter.cone_offset = attenuation.cone_offset[lane];
-                emitter.inverse_range_sq = attenuation.inverse_range_sq[lane];
+                attenuation.attenuate(lane, &mut emitter);
             }
             (self.rows[row].branch[lane], emitter)
         })
@@ -273,10 +147,7 @@ impl Weights {
             && (0..branches.len()).all(|entry| branches.next() == Some(self.rows[entry % rows].branch[entry / rows]))
             && self.rows.iter().all(Row::is_sound)
             && self.attenuation.iter().all(Attenuation::is_sound)
-            && self
-                .expected
-                .iter()
-                .all(|Expected(channels)| channels.as_flattened().iter().copied().all(is_amount))
+            && self.expected.iter().all(Expected::is_sound)
     }
 
     /// Bytes held.
@@ -399,9 +270,7 @@ impl Weights {
             for lane in 0..LANES {
                 let mut emitter = row.emitter(lane);
                 if let Some(attenuation) = attenuation {
-                    emitter.cone_scale = attenuation.cone_scale[lane];
-                    emitter.cone_offset = attenuation.cone_offset[lane];
-                    emitter.inverse_range_sq = attenuation.inverse_range_sq[lane];
+                    attenuation.attenuate(lane, &mut emitter);
                 }
                 let importance = emitter.importance::<ATTENUATED>(view.receiver);
                 weights[lane] = importance * drawn[lane];

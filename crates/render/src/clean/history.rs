@@ -9,16 +9,11 @@
 
 use super::frame::{Frame, Guide, luminance_of};
 use super::projection::Projection;
+use super::row::{Past, Row, kept};
 use glam::{Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 use scene::Camera;
 
-/// Samples that history counts for at most. Higher values are less noisy; lower values lag less behind light that changes, and
-/// blur less by being looked up again and again. 4 is the paper's: on walks through `rooms` longer histories had larger errors,
-/// because samples from before anything was learned stayed in them.
-const LONGEST: f32 = 4.0;
-/// With so many samples of its own a pixel needs no history any more.
-const INDEPENDENT: f32 = 64.0;
 /// Least cosine between normals of one surface.
 const ALIKE_NORMALS: f32 = 0.9;
 /// Greatest distance between planes of one surface, in edges of a pixel.
@@ -33,24 +28,9 @@ const CONTRADICTION: f32 = 4.0;
 /// From so many samples on their variance is known: from two, less what rounding takes when they are looked up.
 const TWO_SAMPLES: f32 = 1.999;
 
-/// Pictures in a row.
+/// What was known in earlier pictures.
 #[derive(Debug, Default)]
-pub(super) struct History {
-    /// The last picture through another camera, or before the film began anew.
-    before: Option<Past>,
-    /// The newest picture.
-    newest: Option<Past>,
-}
-
-/// A picture that was shown.
-#[derive(Debug)]
-struct Past {
-    width: u32,
-    height: u32,
-    spp: u64,
-    projection: Projection,
-    pixels: Vec<Known>,
-}
+pub(super) struct History(Row<Known>);
 
 /// What is known about the light on a pixel's surface.
 #[derive(Clone, Copy, Debug)]
@@ -70,21 +50,12 @@ impl History {
     /// Averages `frame`'s light with what was known, and estimates its variance where there are enough samples for that.
     pub(super) fn accumulate(&mut self, frame: &mut Frame, camera: &Camera) {
         let projection = Projection::new(camera, frame.width as f32 / frame.height as f32);
-        let goes_on = self.newest.as_ref().is_some_and(|past| {
-            past.projection == projection
-                && (past.width, past.height) == (frame.width, frame.height)
-                && past.spp < frame.spp
-        });
-        if !goes_on && self.newest.is_some() {
-            self.before = self.newest.take();
-        }
-        let known: Vec<Known> = match &self.before {
+        let known: Vec<Known> = match self.0.begin(frame, &projection) {
             Some(past) => past.looked_up(frame, &projection),
             None => frame.guides.iter().map(|&guide| Known::nothing(guide)).collect(),
         };
         let trust = trust(frame, &known);
         let spp = frame.spp as f32;
-        let longest = LONGEST * (1.0 - spp / INDEPENDENT).max(0.0);
         let blocks_per_row = (frame.width as usize).div_ceil(BLOCK);
         let width = frame.width as usize;
         let pixels = known
@@ -93,17 +64,12 @@ impl History {
             .enumerate()
             .map(|(i, (known, light))| {
                 let trust = trust[i / width / BLOCK * blocks_per_row + i % width / BLOCK];
-                let now = known.with(*light, spp, longest.min(known.samples) * trust);
+                let now = known.with(*light, spp, kept(known.samples, spp) * trust);
                 *light = now.irradiance.extend(now.variance());
                 now
             });
-        self.newest = Some(Past {
-            width: frame.width,
-            height: frame.height,
-            spp: frame.spp,
-            projection,
-            pixels: pixels.collect(),
-        });
+        let pixels = pixels.collect();
+        self.0.keep(frame, projection, pixels);
     }
 }
 
@@ -149,7 +115,7 @@ impl Known {
     }
 }
 
-impl Past {
+impl Past<Known> {
     /// What was known about each surface of `frame`.
     fn looked_up(&self, frame: &Frame, projection: &Projection) -> Vec<Known> {
         let size = Vec2::new(frame.width as f32, frame.height as f32);

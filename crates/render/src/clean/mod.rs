@@ -9,6 +9,7 @@ mod frame;
 mod history;
 mod projection;
 mod resolve;
+mod row;
 
 pub use projection::Projection;
 

@@ -8,54 +8,30 @@
 
 use super::frame::Frame;
 use super::projection::Projection;
+use super::row::{Past, Row, kept};
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
 use scene::{Camera, luminance};
 
-/// Samples that history counts for at most. Higher values make smoother edges; lower values ghost less.
-const LONGEST: f32 = 4.0;
-/// With so many samples of its own a pixel needs no history any more.
-const INDEPENDENT: f32 = 64.0;
 /// Standard deviations of the pixels around by which history may differ from their mean. Higher values smooth more; lower
 /// values ghost less.
 const CLIP: f32 = 1.0;
 
-/// Pictures in a row.
-#[derive(Debug, Default)]
-pub(super) struct Resolver {
-    /// The last picture through another camera, or before the film began anew.
-    before: Option<Past>,
-    /// The newest picture.
-    newest: Option<Past>,
-}
+/// A pixel's radiance, and the samples that it rests on.
+type Shown = (Vec3, f32);
 
-/// A picture that was shown.
-#[derive(Debug)]
-struct Past {
-    width: u32,
-    height: u32,
-    spp: u64,
-    projection: Projection,
-    /// Radiance, and the samples that it rests on.
-    pixels: Vec<(Vec3, f32)>,
-}
+/// What was shown in earlier pictures.
+#[derive(Debug, Default)]
+pub(super) struct Resolver(Row<Shown>);
 
 impl Resolver {
     /// The frame's picture, averaged with those before.
     pub(super) fn resolve(&mut self, frame: &Frame, camera: &Camera) -> Vec<Vec3> {
         let pixels = frame.assembled();
         let projection = Projection::new(camera, frame.width as f32 / frame.height as f32);
-        let goes_on = self.newest.as_ref().is_some_and(|past| {
-            past.projection == projection
-                && (past.width, past.height) == (frame.width, frame.height)
-                && past.spp < frame.spp
-        });
-        if !goes_on && self.newest.is_some() {
-            self.before = self.newest.take();
-        }
         let spp = frame.spp as f32;
         let scale = 1.0 / typical_luminance(&pixels);
-        let resolved: Vec<(Vec3, f32)> = match &self.before {
+        let resolved: Vec<Shown> = match self.0.begin(frame, &projection) {
             None => pixels.par_iter().map(|&pixel| (pixel, spp)).collect(),
             Some(past) => {
                 let compressed: Vec<Vec3> = pixels.par_iter().map(|&pixel| compress(pixel * scale)).collect();
@@ -69,7 +45,7 @@ impl Resolver {
                     let Some((shown, samples)) = known else {
                         return (pixels[i], spp);
                     };
-                    let kept = samples.min(LONGEST) * (1.0 - spp / INDEPENDENT).max(0.0);
+                    let kept = kept(samples, spp);
                     let shown = drawn_towards(compress(shown * scale), mean, deviation * CLIP);
                     let mixed = shown.lerp(compressed[i], spp / (spp + kept));
                     (expand(mixed) / scale, spp + kept)
@@ -78,20 +54,14 @@ impl Resolver {
             }
         };
         let shown = resolved.iter().map(|(pixel, _)| *pixel).collect();
-        self.newest = Some(Past {
-            width: frame.width,
-            height: frame.height,
-            spp: frame.spp,
-            projection,
-            pixels: resolved,
-        });
+        self.0.keep(frame, projection, resolved);
         shown
     }
 }
 
-impl Past {
+impl Past<Shown> {
     /// What was shown at this share of width and height; `None` outside.
-    fn at(&self, share: Vec2) -> Option<(Vec3, f32)> {
+    fn at(&self, share: Vec2) -> Option<Shown> {
         let (width, height) = (self.width as usize, self.height as usize);
         let inside = share.cmpge(Vec2::ZERO).all() && share.cmple(Vec2::ONE).all();
         if !inside {

@@ -15,6 +15,7 @@ macro_rules! files {
 const FILES: &[(&str, &str)] = files![
     "clean/film.wgsl",
     "clean/guide.wgsl",
+    "clean/kept.wgsl",
     "clean/projection.wgsl",
     "lib/constants.wgsl",
     "lib/control.wgsl",

@@ -215,8 +215,8 @@ impl OnDevice {
         })
     }
 
-    /// Decides which picture is the one before, as both steps do on the CPU. Returns room for the new one.
-    // twin: crates/render/src/clean/history.rs accumulate
+    /// Decides which picture is the one before. Returns room for the new one.
+    // twin: crates/render/src/clean/row.rs begin
     fn begin(&mut self, seen: &Seen, spp: u64) -> Kept {
         match self.newest.take() {
             Some(newest) if newest.seen == *seen && newest.spp < spp => newest.kept,
