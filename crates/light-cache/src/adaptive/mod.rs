@@ -53,6 +53,14 @@ const TABLE_SHARE: f64 = 0.01;
 /// Entries of a cell are drawn with 52 bits, which `f64` holds exactly; what is below goes to the lights within an entry.
 const CELL_SHIFT: u32 = 11;
 
+/// So few lights are known after the first frames: then epochs grow by [`FEW_LIGHTS_GROWTH`], else by [`EPOCH_GROWTH`].
+/// Higher values keep the strata of random numbers in more scenes; lower values learn more.
+const FEW_LIGHTS: usize = 64;
+/// By how much epochs grow where lights are few, see [`Schedule::new`].
+const FEW_LIGHTS_GROWTH: u32 = 16;
+/// The same where they are many.
+const EPOCH_GROWTH: u32 = 2;
+
 /// Lights that are drawn from one evaluation of a cell.
 const EACH: usize = 8;
 
@@ -125,7 +133,11 @@ impl AdaptiveSampler {
             table: TableSampler::net(lights, scene.radius, &within_table),
             cells: Cells::new(scene.center_ws, scene.radius, Tree::unit(lights)),
             table_mass: (share * 4_294_967_296.0) as u32,
-            schedule: Schedule::new(2),
+            schedule: Schedule::new(if lights.len() <= FEW_LIGHTS {
+                FEW_LIGHTS_GROWTH
+            } else {
+                EPOCH_GROWTH
+            }),
             frames: 0,
             settings: settings.clone(),
             build_s: start.elapsed().as_secs_f64(),
