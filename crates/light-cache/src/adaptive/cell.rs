@@ -27,10 +27,13 @@ pub(super) const MAX_ENTRIES: usize = 96;
 const FIRST_ENTRIES: usize = 72;
 /// Entries of at least this share of the whole weight that are clusters are split.
 const SPLIT_SHARE: f32 = 0.5 / MAX_ENTRIES as f32;
-/// Sibling entries that together have less than this share of the whole weight may be merged.
+/// Sibling entries that together have less than this share of the whole weight, and of what is drawn, may be merged.
 const MERGE_SHARE: f32 = 0.05 / MAX_ENTRIES as f32;
 /// Points that stand for the cell where an entry's weight is wanted without a point.
 const PROBES: usize = 8;
+/// Points of a lesson at which the entries' shares are looked up, at most. Higher values know better what may be merged; lower values
+/// are faster.
+const SHARE_POINTS: usize = 32;
 /// Weights are made anew when the cell has seen this many times more than when they were last made.
 const REBUILD_GROWTH: f32 = 1.15;
 
@@ -176,15 +179,16 @@ impl Cell {
         }
     }
 
-    /// Learns from the cell's observations of one frame, in order. `unit`: what the tree's importance is measured in.
-    pub(super) fn learn<'o>(
+    /// Learns from the cell's observations of one lesson, in order. `unit`: what the tree's importance is measured in.
+    pub(super) fn learn(
         &mut self,
         lights: Lights<'_>,
         unit: f32,
         may_grow: MayGrow,
-        observations: impl Iterator<Item = &'o (&'o Observation, Cube)>,
+        observations: &[(&Observation, Cube)],
     ) {
         let tree = lights.tree;
+        self.look_up_shares(observations);
         for &(o, cube) in observations {
             let times = o.weight as f32;
             if let Some(bounce) = o.bounce {
@@ -223,6 +227,24 @@ impl Cell {
             self.build(lights);
         }
         self.subcells.refresh(&self.counts(), false);
+    }
+
+    /// Takes note of the share that each entry has in what is drawn at some of the points.
+    fn look_up_shares(&mut self, observations: &[(&Observation, Cube)]) {
+        let step = observations.len().div_ceil(SHARE_POINTS).max(1);
+        for (o, cube) in observations.iter().step_by(step) {
+            let view = View {
+                receiver: &Receiver::from(&o.point),
+                factors: self.subcells.factors(*cube),
+                width: 1,
+            };
+            let Some(shares) = self.weights.shares(&view, self.entries.len()) else {
+                continue;
+            };
+            for (entry, share) in self.entries.iter_mut().zip(shares) {
+                entry.observe_share(share, o.weight as f32);
+            }
+        }
     }
 
     /// The learned weights.
@@ -300,7 +322,7 @@ impl Cell {
             + self.probes.capacity() * size_of::<Receiver>()
     }
 
-    /// Splits clusters that weigh much; merges parts that together weigh next to nothing, to make room.
+    /// Splits clusters that weigh much; merges parts that together weigh next to nothing and are hardly drawn, to make room.
     fn refine(&mut self, tree: &Tree) {
         let total: f32 = self.entries.iter().map(Entry::weight).sum();
         if total <= 0.0 {
@@ -308,7 +330,7 @@ impl Cell {
         }
         let mut j = 0;
         while j < self.entries.len() {
-            j = if self.merge_at(tree, j, MERGE_SHARE * total) {
+            j = if self.merge_at(tree, j, total) {
                 j.saturating_sub(MAX_LEAF_LIGHTS)
             } else {
                 j + 1
@@ -325,9 +347,9 @@ impl Cell {
         }
     }
 
-    /// Replaces the entries from `j` on by their parent if they are all of its parts and weigh less than `limit`.
-    fn merge_at(&mut self, tree: &Tree, j: usize, limit: f32) -> bool {
-        if self.entries[j].weight() >= limit {
+    /// Replaces the entries from `j` on by their parent if they are all of its parts and matter little. `total`: the weight of all.
+    fn merge_at(&mut self, tree: &Tree, j: usize, total: f32) -> bool {
+        if self.entries[j].share(total) >= MERGE_SHARE {
             return false;
         }
         let Some(parent) = self.entries[j].branch.parent(tree) else {
@@ -337,10 +359,11 @@ impl Cell {
         let Some(parts) = self.entries.get(j..j + count) else {
             return false;
         };
-        let weight: f32 = parts.iter().map(Entry::weight).sum();
-        if weight >= limit || !parts.iter().map(|e| e.branch).eq(branches[..count].iter().copied()) {
+        let share: f32 = parts.iter().map(|part| part.share(total)).sum();
+        if share >= MERGE_SHARE || !parts.iter().map(|e| e.branch).eq(branches[..count].iter().copied()) {
             return false;
         }
+        let weight: f32 = parts.iter().map(Entry::weight).sum();
         // What was seen of the parts says nothing of the parent's own second moment: it starts with their joint weight.
         let mut merged = self.unseen(tree, parent);
         if weight > 0.0 {
@@ -414,5 +437,42 @@ impl<'c> Nearby<'c> {
         let mut part = [None];
         self.draw_each(receiver, &[wanted], width, &mut part);
         part[0]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::testing::{mixed_lights, points};
+
+    /// What was never visible but to a few points has next to no weight in the cell as a whole, and is kept apart by what it is at those.
+    #[test]
+    fn what_is_drawn_in_a_corner_of_the_cell_is_not_merged() {
+        let tree = Tree::new(&mixed_lights(32, 3));
+        let lights = Lights {
+            tree: &tree,
+            palette: None,
+        };
+        let origin = Origin {
+            level: 0,
+            primary: true,
+            frame: 0,
+        };
+        let probes: Vec<Receiver> = points(64, 5).iter().map(Receiver::from).collect();
+        let is_kept = |cornered: usize, share: f32| {
+            let mut cell = Cell::new(origin, &probes, lights);
+            let heaviest = cell.entries.iter().map(|entry| entry.scale).fold(0.0, f32::max);
+            for (j, entry) in cell.entries.iter_mut().enumerate() {
+                let times = if entry.scale == heaviest { 1.0 } else { 1e16 };
+                entry.observe(0.0, false, 0.0, times);
+                entry.observe_share(if j == cornered { share } else { 0.0 }, 100.0);
+            }
+            let branch = cell.entries[cornered].branch;
+            cell.refine(&tree);
+            cell.branches().any(|kept| kept == branch)
+        };
+        let merged: Vec<usize> = (1..24).filter(|&entry| !is_kept(entry, 0.0)).collect();
+        assert!(merged.len() > 4, "{merged:?}");
+        assert!(merged.iter().all(|&entry| is_kept(entry, 2.0 * MERGE_SHARE)));
     }
 }

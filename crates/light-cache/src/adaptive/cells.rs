@@ -197,7 +197,8 @@ impl Cells {
         self.cells.par_iter_mut().enumerate().for_each(|(i, cell)| {
             let range = starts[i] as usize..starts[i + 1] as usize;
             if !range.is_empty() {
-                cell.learn(lights, unit, may_grow, by_cell[range].iter().flatten());
+                let observations: Vec<_> = by_cell[range].iter().flatten().copied().collect();
+                cell.learn(lights, unit, may_grow, &observations);
             }
         });
     }

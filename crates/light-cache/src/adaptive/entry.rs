@@ -15,6 +15,9 @@ const LASTING_PRIOR: f32 = 0.1;
 /// own the cell. Statistics only: the image is not clamped.
 const SPIKE: f32 = 16.0;
 
+/// At how many points its share in what is drawn must be known before it is believed.
+const ENOUGH_POINTS: f32 = 8.0;
+
 /// A part of the light tree and what was seen of it here. What is seen is counted as a ratio: irradiance divided by the
 /// probability of the light within the entry, over what the emitter was estimated to send to the point.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
@@ -33,6 +36,10 @@ pub(super) struct Entry {
     sum_sq: f32,
     /// Root mean square ratio expected beforehand.
     pub(super) prior: f32,
+    /// Sum of its shares in what is drawn, over the points where that was looked up.
+    shares: f32,
+    /// How many points those are.
+    points: f32,
 }
 
 impl Entry {
@@ -46,6 +53,8 @@ impl Entry {
             sum: 0.0,
             sum_sq: 0.0,
             prior: 1.0,
+            shares: 0.0,
+            points: 0.0,
         }
     }
 
@@ -59,6 +68,8 @@ impl Entry {
             self.sum,
             self.sum_sq,
             self.prior,
+            self.shares,
+            self.points,
         ];
         amounts.into_iter().all(is_amount)
     }
@@ -75,12 +86,25 @@ impl Entry {
     /// Estimated mean ratio over the root mean square. Of what was never seen nothing is expected.
     pub(super) fn mean_over_ratio(&self) -> f32 {
         let mean = self.sum / (self.count.drawn + PRIOR_COUNT);
-        if mean > 0.0 { mean / self.ratio() } else { 0.0 }
+        let ratio = self.ratio();
+        if mean > 0.0 && ratio > 0.0 { mean / ratio } else { 0.0 }
     }
 
     /// Weight in the cell as a whole.
     pub(super) fn weight(&self) -> f32 {
         self.ratio() * self.scale
+    }
+
+    /// Takes note of its share in what is drawn at a point that stands for so many.
+    pub(super) fn observe_share(&mut self, share: f32, times: f32) {
+        self.shares += times * share;
+        self.points += times;
+    }
+
+    /// Its share in the `total` weight of all entries, or in what is drawn as a mean over the points of the cell, if that is known and
+    /// more: what matters in a corner of the cell has next to no weight in the cell as a whole.
+    pub(super) fn share(&self, total: f32) -> f32 {
+        (self.weight() / total).max(self.shares / self.points.max(ENOUGH_POINTS))
     }
 
     /// The emitter, as strong as was believed before anything was seen.

@@ -56,8 +56,8 @@ const CELL_SHIFT: u32 = 11;
 /// So few lights are known after the first frames: then epochs grow by [`FEW_LIGHTS_GROWTH`], else by [`EPOCH_GROWTH`].
 /// Higher values keep the strata of random numbers in more scenes; lower values learn more.
 const FEW_LIGHTS: usize = 64;
-/// By how much epochs grow where lights are few, see [`Schedule::new`].
-const FEW_LIGHTS_GROWTH: u32 = 16;
+/// By how much epochs grow where lights are few, see [`Schedule::new`]: so much that nobody waits for the end of the next one.
+const FEW_LIGHTS_GROWTH: u32 = 1 << 20;
 /// The same where they are many.
 const EPOCH_GROWTH: u32 = 2;
 

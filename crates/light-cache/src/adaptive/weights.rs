@@ -212,6 +212,18 @@ impl Weights {
         }
     }
 
+    /// The share of each of the first `count` entries in all weights, in tree order; `None` where nothing arrives.
+    pub(super) fn shares(&self, view: &View<'_>, count: usize) -> Option<impl Iterator<Item = f32>> {
+        let (weights, lanes, _) = if self.attenuation.is_empty() {
+            self.evaluate::<false, false>(view)
+        } else {
+            self.evaluate::<true, false>(view)
+        };
+        let (rows, total) = (self.rows.len(), sum(lanes));
+        let share = move |entry: usize| weights[entry % rows][entry / rows] / total;
+        (total > 0.0 && total.is_finite()).then(|| (0..count).map(share))
+    }
+
     #[inline(always)]
     fn part(
         &self,
